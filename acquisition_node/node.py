@@ -13,7 +13,11 @@ ROS Parameters:
         them. A goal has a folder of its own there, in which the same goal goes on.
     settings (string, "small"), changes (string, ""): how skills are learned, as ``slap acquire``
         has it; changes as ``rollouts=20 sac.gamma=0.9``.
-    steps (int, 150000): environment steps that a goal may learn for at most.
+    steps (int, 150000): environment steps that a goal of slap/acquire_skills may learn for at most.
+    shortcut_settings (string, "ours_near"), shortcut_changes (string, ""): how shortcuts are
+        learned, as ``slap grow`` has it.
+    growth_steps (int, 1000000): environment steps that a goal of slap/grow_skills may learn for at
+        most.
     jobs (int, 1): processes that learn.
     begin_with (string, ""): libraries that skills may begin with, separated by blanks.
     attempts (int, 40), tokens (int, 400000), seconds (double, 900.0): the most that one goal may
@@ -40,12 +44,14 @@ Action servers:
     slap/propose_operators (slap_msgs/ProposeOperators): one proposal.
     slap/acquire_skills (slap_msgs/AcquireSkills): the skills that a goal takes. They are learned in
         a process of its own, which ends when the goal is canceled or the node ends.
+    slap/grow_skills (slap_msgs/GrowSkills): skills, shortcuts over them, and again until plans get
+        no shorter; in such a process as well.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -55,12 +61,14 @@ from typing import Any
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
-from slap_msgs.action import AcquireSkills, ProposeOperators
+from slap_msgs.action import AcquireSkills, GrowSkills, ProposeOperators
 
 from acquisition_node.acquisition_publisher import AcquisitionPublisher
 from acquisition_node.proposal_job import ProposalJob
 from acquisition_node.skill_acquisition import SkillAcquisition
+from acquisition_node.skill_growth import SkillGrowth
 from acquisition_node.trainer import Trainer
+from acquisition_node.trainer_goal import TrainerGoal
 from acquisition_node.training_request import TrainingRequest, goal_in_words
 from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.answering import error_to_answer
@@ -69,7 +77,7 @@ from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.episode_tracker import EpisodeTracker
 from ensemble.futures import submit, wait_for_first, wait_until
-from ensemble.interfaces import ACQUIRE_SKILLS, PROPOSE_OPERATORS
+from ensemble.interfaces import ACQUIRE_SKILLS, GROW_SKILLS, PROPOSE_OPERATORS
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
 from ensemble.patience import load_advice
@@ -78,6 +86,7 @@ from slap_ros.errors import BusyError, EpisodeChangedError, NoTaskError, TaskCan
 from slap_ros.messages.decode import decode_goal
 
 SKILLS_SUBJECT = "skills"  # of events about an acquisition as a whole
+Answer = Callable[[ServerGoalHandle, Episode], Coroutine[None, None, Any]]
 THREADS = 2  # a canceled proposal may still wait for its model while the next one begins
 
 
@@ -85,7 +94,7 @@ class AcquisitionNode(Node):
     """Makes proposals, and has the skills of their operators learned in a process of its own."""
 
     def __init__(self, **kwargs: Any) -> None:
-        """Serve both actions; ``kwargs`` are the node's."""
+        """Serve all actions; ``kwargs`` are the node's."""
         super().__init__("acquisition_node", **kwargs)
         self._settings = read_parameters(self, AcquisitionParameters)
         common = read_parameters(self, CommonParameters)
@@ -109,6 +118,7 @@ class AcquisitionNode(Node):
             for served, execute in (
                 (PROPOSE_OPERATORS, self._execute_proposal),
                 (ACQUIRE_SKILLS, self._execute_acquisition),
+                (GROW_SKILLS, self._execute_growth),
             )
         ]
         DiagnosticsPublisher(self, lambda: {**self._counts, **refusals.counts})
@@ -125,27 +135,42 @@ class AcquisitionNode(Node):
 
     async def _execute_proposal(self, goal: ServerGoalHandle) -> ProposeOperators.Result:
         self._counts["asked"] += 1
-        result = await self._execute(goal, self._propose, "")
+        result = await self._execute(goal, self._propose, ProposeOperators)
         self._counts["proposed"] += result.success
         return result
 
     async def _execute_acquisition(self, goal: ServerGoalHandle) -> AcquireSkills.Result:
+        return await self._execute_training(goal, self._acquire, AcquireSkills)
+
+    async def _execute_growth(self, goal: ServerGoalHandle) -> GrowSkills.Result:
+        return await self._execute_training(goal, self._grow, GrowSkills)
+
+    async def _execute_training(self, goal: ServerGoalHandle, answer: Answer, kind: Any) -> Any:
+        """Answer a goal by training; see :meth:`_execute`.
+
+        Args:
+            goal: What is asked for.
+            answer: Makes the result.
+            kind: Type of the goal's action.
+        """
         self._counts["trainings"] += 1
-        result = await self._execute(goal, self._acquire, SKILLS_SUBJECT)
+        result = await self._execute(goal, answer, kind, SKILLS_SUBJECT)
         self._counts["acquired"] += result.success
         return result
 
     async def _execute(
         self,
         goal: ServerGoalHandle,
-        answer: Callable[[ServerGoalHandle, Episode], Coroutine[None, None, Any]],
-        subject: str,
+        answer: Answer,
+        kind: Any,
+        subject: str = "",
     ) -> Any:
         """Answer a goal, one at a time; errors are in the result, and in an event.
 
         Args:
             goal: What is asked for.
             answer: Makes the result.
+            kind: Type of the goal's action.
             subject: Subject of the event after an error; empty for a proposal.
 
         Returns:
@@ -156,7 +181,6 @@ class AcquisitionNode(Node):
         except Exception as raised:
             error = error_to_answer(self, raised)
             self._publisher.failed(error, subject)
-            kind = AcquireSkills if subject else ProposeOperators
             result = kind.Result(error_code=int(error.code), error_msg=str(error))
         if result.success:
             goal.succeed()
@@ -166,11 +190,7 @@ class AcquisitionNode(Node):
             goal.abort()
         return result
 
-    async def _alone(
-        self,
-        goal: ServerGoalHandle,
-        answer: Callable[[ServerGoalHandle, Episode], Coroutine[None, None, Any]],
-    ) -> Any:
+    async def _alone(self, goal: ServerGoalHandle, answer: Answer) -> Any:
         if self._busy:
             raise BusyError("another proposal or training is under way; cancel it first")
         self._busy = True
@@ -220,9 +240,23 @@ class AcquisitionNode(Node):
         return self._publisher.result(made, problem)
 
     async def _acquire(self, goal: ServerGoalHandle, episode: Episode) -> AcquireSkills.Result:
+        arguments = self._training_request(goal, episode).arguments(self._settings)
+        return await self._train(goal, episode, SkillAcquisition, arguments)
+
+    async def _grow(self, goal: ServerGoalHandle, episode: Episode) -> GrowSkills.Result:
+        arguments = self._training_request(goal, episode).growth_arguments(self._settings)
+        return await self._train(goal, episode, SkillGrowth, arguments)
+
+    def _training_request(self, goal: ServerGoalHandle, episode: Episode) -> TrainingRequest:
+        """The training that a goal asks for.
+
+        Args:
+            goal: What is asked for.
+            episode: Episode of the task.
+        """
         asked, domain = goal.request, episode.domain
         atoms = decode_goal(asked.goal, episode.space) or episode.task.goal
-        request = TrainingRequest(
+        return TrainingRequest(
             domain=domain,
             goal=goal_in_words(domain, episode.task, atoms),
             proposer=asked.proposer,
@@ -231,11 +265,33 @@ class AcquisitionNode(Node):
             seed=asked.seed,
             kept=self._episodes.library_folder,
         )
-        arguments = request.arguments(self._settings)
-        self._trainer = trainer = Trainer(arguments)
+
+    async def _train(
+        self,
+        goal: ServerGoalHandle,
+        episode: Episode,
+        kind: type[TrainerGoal],
+        arguments: Sequence[str],
+    ) -> Any:
+        """Train in a process of its own until it ends or the goal is canceled.
+
+        Args:
+            goal: What is asked for.
+            episode: Episode of the task.
+            kind: Kind of the goal.
+            arguments: Arguments of the goal's command, the folder of the results last.
+
+        Returns:
+            The result of the goal's action.
+
+        Raises:
+            TaskCanceledError: The goal was canceled.
+            SlapError: Training failed.
+        """
+        self._trainer = trainer = Trainer(kind.command, arguments)
         self._publisher.started(episode.number)
         canceled = partial(getattr, goal, "is_cancel_requested")
-        training = SkillAcquisition(goal, domain, trainer, self._publisher)
+        training = kind(goal, episode.domain, trainer, self._publisher)
         job = submit(self._workers, training.run)
         try:
             if await wait_for_first(self, job, canceled):
@@ -245,7 +301,8 @@ class AcquisitionNode(Node):
         finally:
             self._trainer = None
         raise TaskCanceledError(
-            f"canceled; what was learned stays beside {arguments[-1]}, where the same goal goes on"
+            f"canceled; what was learned stays {kind.place} {arguments[-1]}, where the same goal "
+            "goes on"
         )
 
 

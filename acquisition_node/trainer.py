@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Training in a process of its own: ``slap acquire``, its events read as lines of JSON."""
+"""Training in a process of its own: a command of slap, its events read as lines of JSON."""
 
 from __future__ import annotations
 
@@ -28,13 +28,14 @@ Event = dict[str, Any]
 class Trainer:
     """A process that learns. It ends with the node, however the node ends."""
 
-    def __init__(self, arguments: Sequence[str]) -> None:
+    def __init__(self, command: str, arguments: Sequence[str]) -> None:
         """Run nothing yet.
 
         Args:
-            arguments: Command-line arguments of ``slap acquire``.
+            command: Command of slap: acquire or grow.
+            arguments: Command-line arguments of the command.
         """
-        self._command = [sys.executable, "-m", "ensemble.cli", "acquire", *arguments, "--events"]
+        self._command = [sys.executable, "-m", "ensemble.cli", command, *arguments, "--events"]
         self._process: subprocess.Popen[bytes] | None = None
         self._stopped = False
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A training that the node is asked for, as arguments of ``slap acquire``."""
+"""A training that the node is asked for, as arguments of ``slap acquire`` or ``slap grow``."""
 
 from __future__ import annotations
 
@@ -39,25 +39,83 @@ class TrainingRequest:
     kept: Path | None = None
 
     def arguments(self, parameters: AcquisitionParameters) -> list[str]:
-        """The arguments of ``slap acquire``, the library's folder last."""
-        proposer, rewarder = self.proposer or MANUAL, self.rewarder or MANUAL
+        """The arguments of ``slap acquire``, the library's folder last.
+
+        Args:
+            parameters: Parameters of the node.
+        """
+        words = self._task_and_proposers()
+        words += ["--settings", parameters.settings]
+        words += ["--steps", str(self._steps_within(parameters.steps))]
+        words += _each("--set", parameters.changes.split())
+        words += self._sources(parameters)
+        return self._placed(words, self.domain.name, parameters)
+
+    def growth_arguments(self, parameters: AcquisitionParameters) -> list[str]:
+        """The arguments of ``slap grow``, the folder of its results last.
+
+        Args:
+            parameters: Parameters of the node.
+        """
+        words = self._task_and_proposers()
+        words += ["--skill-settings", parameters.settings]
+        words += _each("--set-skills", parameters.changes.split())
+        words += ["--settings", parameters.shortcut_settings]
+        words += _each("--set", parameters.shortcut_changes.split())
+        words += ["--steps", str(self._steps_within(parameters.growth_steps))]
+        words += self._sources(parameters)
+        return self._placed(words, f"{self.domain.name}-grown", parameters)
+
+    def _task_and_proposers(self) -> list[str]:
+        """What is to be done, and who proposes operators and rewards."""
         words = [self.domain.name]
         words += ["--preset", self.domain.preset, "--goal", self.goal, "--seed", str(self.seed)]
-        words += ["--proposer", proposer, "--rewarder", rewarder]
-        words += ["--settings", parameters.settings]
-        words += ["--steps", str(min(self.steps or parameters.steps, parameters.steps))]
-        words += _each("--set", parameters.changes.split())
-        words += _each("--from", parameters.begin_with.split())
+        return [*words, "--proposer", self._proposer, "--rewarder", self._rewarder]
+
+    @property
+    def _proposer(self) -> str:
+        return self.proposer or MANUAL
+
+    @property
+    def _rewarder(self) -> str:
+        return self.rewarder or MANUAL
+
+    def _steps_within(self, most: int) -> int:
+        """Environment steps that are asked for, within what the node allows.
+
+        Args:
+            most: Environment steps that the node allows.
+        """
+        return min(self.steps or most, most)
+
+    def _sources(self, parameters: AcquisitionParameters) -> list[str]:
+        """Libraries to begin with or to keep, demonstrations, and the model to ask.
+
+        Args:
+            parameters: Parameters of the node.
+        """
+        words = _each("--from", parameters.begin_with.split())
         if self.kept is not None:
             words += ["--keep", str(self.kept.absolute())]
-        if proposer == INDUCED:
+        if self._proposer == INDUCED:
             words += _each("--demonstrations", parameters.demonstrations.split())
-        if LANGUAGE in (proposer, rewarder):
+        if LANGUAGE in (self._proposer, self._rewarder):
             words += _asking(parameters)
-        # The same goal goes on where it was, another one has a folder of its own.
+        return words
+
+    def _placed(
+        self, words: Sequence[str], name: str, parameters: AcquisitionParameters
+    ) -> list[str]:
+        """The arguments with the folder of the results: the same goal goes on where it was.
+
+        Args:
+            words: Arguments, by which another goal has a folder of its own.
+            name: Name of the folder, to which a digest of the arguments is added.
+            parameters: Parameters of the node.
+        """
         told = " ".join([*words, str(self.domain.configuration.get(DIGEST_KEY, ""))])
-        name = f"{self.domain.name}-{sha256(told.strip().encode()).hexdigest()[:8]}"
-        output = Path(parameters.output).absolute() / name
+        folder = f"{name}-{sha256(told.strip().encode()).hexdigest()[:8]}"
+        output = Path(parameters.output).absolute() / folder
         return [*words, "--jobs", str(parameters.jobs), "--output", str(output)]
 
 

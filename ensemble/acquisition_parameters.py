@@ -12,6 +12,7 @@ from slap_ros.acquisition.proposals.attempt_log import AttemptLog
 from slap_ros.acquisition.proposals.inquiry import Inquiry
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.language.settings import read_settings
+from slap_ros.shortcuts.settings import NEAR
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,11 @@ class AcquisitionParameters:
     settings: str = parameter("small", "networks and SAC, as slap acquire --settings has it")
     changes: str = parameter("", "NAME=VALUE of these settings, separated by blanks")
     steps: int = parameter(150_000, "environment steps that all skills together learn for", 1)
+    shortcut_settings: str = parameter(NEAR, "of shortcuts, as slap grow --settings has it")
+    shortcut_changes: str = parameter("", "NAME=VALUE of these settings, separated by blanks")
+    growth_steps: int = parameter(
+        1_000_000, "environment steps that skills and shortcuts together are learned for", 1
+    )
     jobs: int = parameter(1, "processes that learn", 1, 1000)
     begin_with: str = parameter("", "libraries that skills may begin with, separated by blanks")
     task_timeout: float = parameter(10.0, "s to wait for a task")

@@ -16,7 +16,13 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from slap_msgs.action import AcquireSkills, ExecuteSkill, ProposeOperators, SolveTask
+from slap_msgs.action import (
+    AcquireSkills,
+    ExecuteSkill,
+    GrowSkills,
+    ProposeOperators,
+    SolveTask,
+)
 from slap_msgs.msg import (
     AbstractState,
     AcquisitionEvent,
@@ -143,3 +149,4 @@ SOLVE_TASK = Call("slap/solve_task", SolveTask)
 EXECUTE_SKILL = Call("slap/execute_skill", ExecuteSkill)
 PROPOSE_OPERATORS = Call("slap/propose_operators", ProposeOperators)
 ACQUIRE_SKILLS = Call("slap/acquire_skills", AcquireSkills)
+GROW_SKILLS = Call("slap/grow_skills", GrowSkills)

@@ -272,7 +272,9 @@ def _foxglove(options: RunOptions) -> Iterator[FoxgloveServer | None]:
 
 def _event_view(live: bool) -> AbstractContextManager[OnMessage]:
     """What shows the run: a view in place on a terminal, lines elsewhere."""
-    return Dashboard(console) if live and console.is_terminal else nullcontext(EventPrinter())
+    if live and console.rich.is_terminal:
+        return Dashboard(console.rich)
+    return nullcontext(EventPrinter())
 
 
 def _conclude(metrics: RunMetrics, record: Path | None) -> None:

@@ -146,10 +146,10 @@ class AcquisitionRequest:
             return EmbeddingEncoder(LocalEmbedder(self.encoder.removeprefix(LOCAL_SCHEME)), work)
         proposers = self.proposers
         settings = read_settings(proposers.language_settings, self.encoder, proposers.base_url)
-        if settings.base_url.startswith(LOCAL_SCHEME):
+        if not settings.asks_a_server:
             raise InvalidParameterError(
-                f"--encoder asks a server; {settings.base_url} is not one: give another "
-                f"--base-url, or --encoder {LOCAL_SCHEME}PACKAGE"
+                f"--encoder asks a server; {settings.model} at {settings.base_url} is not one: "
+                f"give another --base-url, or --encoder {LOCAL_SCHEME}PACKAGE"
             )
         return EmbeddingEncoder(ServerEmbedder(settings), work)
 

@@ -7,12 +7,12 @@ skills that carry out the new goal are used as they are, and learned further whe
 each, all goals so far are tried, so that what was forgotten shows. A folder has::
 
     0-task0/library, 0-task0/training    the library after the first goal, and its work folder
-    0-task0/tried.json                   how far plans for all goals so far get with that library
+    0-task0/tried.json                   what comes of plans for all goals so far with that library
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -24,7 +24,7 @@ from slap_ros.acquisition.curriculum.jobs import horizon_of
 from slap_ros.acquisition.curriculum.rollouts import roll_out
 from slap_ros.api.acquisition import AcquisitionWatch, carry_out
 from slap_ros.api.acquisition_request import AcquisitionRequest
-from slap_ros.api.learning_curves import PLAN, CurveCallback, steps_to
+from slap_ros.api.learning_curves import PLAN, CurveCallback, Point, steps_to
 from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.errors import InvalidParameterError
@@ -34,7 +34,10 @@ from slap_ros.skills.skill import LearnedSkill
 from slap_ros.skills.skill_library import SkillLibrary, save_skill_library
 
 SEQUENCE_SEED = 400  # seed of the tasks that goals are tried in; training and studies use others
-LEVEL = 0.8  # task progress up to which steps are counted
+LEVEL = 0.8  # share of tasks that are solved up to which steps are counted, as in the paper
+IN_A_ROW = 3  # judgements in a row that must have it
+
+_Tries = Mapping[str, Sequence[float]]  # task progress of each task, by goal
 
 
 @dataclass(frozen=True)
@@ -69,17 +72,33 @@ class SequenceRequest:
 
 
 @dataclass(frozen=True)
+class KnownStart:
+    """A known skill that another one began with.
+
+    Args:
+        skill: Name and digest of the known skill.
+        success: Success rate of the known skill before anything was learned.
+    """
+
+    skill: str
+    success: float
+
+
+@dataclass(frozen=True)
 class SequenceStep:
     """What came of one goal of a sequence.
 
     Args:
         goal: Name of the goal, or its atoms.
         steps: Environment steps learned for it, all skills together.
-        steps_to_level: Environment steps after which task progress of ``LEVEL`` was first measured.
-        reached: Whether it ever was; else ``steps_to_level`` are all steps.
+        steps_to_level: Environment steps after which ``IN_A_ROW`` judgements in a row first had
+            ``LEVEL`` of the tasks solved; see :class:`~slap_ros.api.learning_curves.SolvedShares`.
+        reached: Whether they ever had; else ``steps_to_level`` are all steps.
         learned: Environment steps of each skill that was learned further, by operator.
+        retrieved: Known skill that each of these began with, and its success before, by operator.
         ended: Reason why its acquisition was over, in words.
         tried: Task progress on each goal so far, this one last, by goal.
+        solved: Share of the tasks that were solved, for the same goals.
     """
 
     goal: str
@@ -87,12 +106,14 @@ class SequenceStep:
     steps_to_level: int
     reached: bool
     learned: Mapping[str, int]
+    retrieved: Mapping[str, KnownStart]
     ended: str
     tried: Mapping[str, float] = field(default_factory=dict)
+    solved: Mapping[str, float] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object."""
-        return {**asdict(self), "learned": dict(self.learned), "tried": dict(self.tried)}
+        return asdict(self)
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> SequenceStep:
@@ -107,9 +128,15 @@ class SequenceStep:
             int(data["steps_to_level"]),
             bool(data["reached"]),
             {str(name): int(steps) for name, steps in dict(data["learned"]).items()},
+            {str(name): KnownStart(**one) for name, one in dict(data["retrieved"]).items()},
             str(data["ended"]),
-            {str(goal): float(progress) for goal, progress in dict(data["tried"]).items()},
+            _numbers(data["tried"]),
+            _numbers(data["solved"]),
         )
+
+
+def _numbers(data: Any) -> dict[str, float]:
+    return {str(goal): float(value) for goal, value in dict(data).items()}
 
 
 def acquire_sequence(
@@ -117,6 +144,7 @@ def acquire_sequence(
     jobs: int | None,
     ray: str | None,
     watch: AcquisitionWatch,
+    on_goal: Callable[[int, str], None] = lambda *_: None,
 ) -> list[SequenceStep]:
     """Acquire skills for one goal after another, and save the last library.
 
@@ -127,6 +155,8 @@ def acquire_sequence(
         jobs: Number of processes; None for this one.
         ray: Address of a Ray cluster to run on instead.
         watch: Functions that are called while skills are acquired.
+        on_goal: Function that receives the number of each goal, from 0, and the goal, as its
+            acquisition begins.
 
     Returns:
         What came of each goal, in their order.
@@ -138,18 +168,21 @@ def acquire_sequence(
     WorkFolder(base.work_folder).require_same(_described(request))
     steps: list[SequenceStep] = []
     library = SkillLibrary(base.domain.name)
+    known: _Tries = {}
     for number, goal in enumerate(request.goals):
+        on_goal(number, goal)
         folder = base.work_folder / f"{number}-{_file_name(goal)}"
-        keep = _library_of(request, number - 1) if steps and not request.scratch else None
         acquisition = replace(
             base,
             goal=goal,
-            keep=keep,
+            keep=_library_of(request, number - 1) if steps and not request.scratch else None,
             library_folder=folder / "library",
             work_folder=folder / "training",
         )
-        library, step = _one_goal(acquisition, jobs, ray, watch)
-        steps.append(replace(step, tried=_tried(request, number, folder)))
+        before = library if not request.scratch else SkillLibrary(base.domain.name)
+        library, measured = _one_goal(acquisition, jobs, ray, watch)
+        known = _tried(request, number, folder, known if library.digest == before.digest else {})
+        steps.append(_step(goal, before, library.record, measured, known))
     sequence = {"scratch": request.scratch, "goals": [step.as_json() for step in steps]}
     record = {**library.record, "sequence": sequence}
     save_skill_library(base.library_folder, replace(library, record=record))
@@ -172,9 +205,47 @@ def _library_of(request: SequenceRequest, number: int) -> Path:
     return request.acquisition.work_folder / name / "library"
 
 
+def _step(
+    goal: str,
+    before: SkillLibrary,
+    record: Mapping[str, Any],
+    measured: CurveCallback,
+    tries: _Tries,
+) -> SequenceStep:
+    """What came of a goal.
+
+    Args:
+        goal: Name of the goal, or its atoms.
+        before: Library that was carried on.
+        record: Record of the library after the goal.
+        measured: Measurements of the acquisition.
+        tries: What came of the tasks of all goals so far with that library.
+    """
+    solved = {name: fmean(one == 1.0 for one in tasks) for name, tasks in tries.items()}
+    judged = [*measured.solved.points, Point(record["steps"], solved[goal])]
+    steps, reached = steps_to(judged, LEVEL, IN_A_ROW)
+    known = {skill.operator.name: skill.folder_name for skill in before.skills}
+    learned = {name: points for name, points in measured.curves.items() if name != PLAN}
+    return SequenceStep(
+        goal,
+        record["steps"],
+        steps,
+        reached,
+        {name: points[-1].steps for name, points in learned.items()},
+        {
+            name: KnownStart(known[name], points[0].success)
+            for name, points in learned.items()
+            if name in known
+        },
+        record["ended"],
+        {name: fmean(tasks) for name, tasks in tries.items()},
+        solved,
+    )
+
+
 def _one_goal(
     acquisition: AcquisitionRequest, jobs: int | None, ray: str | None, watch: AcquisitionWatch
-) -> tuple[SkillLibrary, SequenceStep]:
+) -> tuple[SkillLibrary, CurveCallback]:
     """Acquire what one goal needs, and take note of what that took."""
     curves: list[CurveCallback] = []
     segment_steps = acquisition.chosen_settings().segment_steps(horizon_of(acquisition.domain))
@@ -186,28 +257,37 @@ def _one_goal(
             yield curves[-1]
 
     library = carry_out(acquisition, jobs, ray, replace(watch, curriculum=watched))
-    found = curves[-1].curves
-    steps, reached = steps_to(found[PLAN], LEVEL)
-    learned = {name: points[-1].steps for name, points in found.items() if name != PLAN}
-    record = library.record
-    goal = acquisition.goal_or_first
-    return library, SequenceStep(goal, record["steps"], steps, reached, learned, record["ended"])
+    return library, curves[-1]
 
 
-def _tried(request: SequenceRequest, number: int, folder: Path) -> dict[str, float]:
-    """Task progress on all goals up to one, with the library after it; read where it is there."""
-    goals = request.goals[: number + 1]
-    return WorkFolder(folder).cached("tried", lambda: _try(request, goals, folder), dict)
+def _tried(
+    request: SequenceRequest, number: int, folder: Path, known: _Tries
+) -> dict[str, list[float]]:
+    """What comes of the tasks of all goals up to one, with the library after it.
+
+    Args:
+        request: Request of the sequence.
+        number: Number of the goal.
+        folder: Folder of the goal, where it is read if it is there already.
+        known: What came of goals before with the same library, which would be the same again.
+    """
+
+    def try_goals() -> dict[str, list[float]]:
+        base = request.acquisition.domain
+        domain = open_domain(DomainChoice(base.name, base.preset, str(folder / "library")))
+        return {
+            goal: list(known[goal]) if goal in known else _progress(domain, goal, request.tasks)
+            for goal in request.goals[: number + 1]
+        }
+
+    def read(data: Any) -> dict[str, list[float]]:
+        return {goal: list(map(float, data[goal])) for goal in request.goals[: number + 1]}
+
+    return WorkFolder(folder).cached("tried", try_goals, read)
 
 
-def _try(request: SequenceRequest, goals: Sequence[str], folder: Path) -> dict[str, float]:
-    """Task progress on goals with the library in a folder."""
-    base = request.acquisition.domain
-    domain = open_domain(DomainChoice(base.name, base.preset, str(folder / "library")))
-    return {goal: _progress(domain, goal, request.tasks) for goal in goals}
-
-
-def _progress(domain: Domain, goal: str, tasks: int) -> float:
+def _progress(domain: Domain, goal: str, tasks: int) -> list[float]:
+    """The task progress of each task."""
     skills = {n: skill for n, skill in domain.skills.items() if isinstance(skill, LearnedSkill)}
     rollouts = [
         roll_out(
@@ -219,7 +299,7 @@ def _progress(domain: Domain, goal: str, tasks: int) -> float:
         )
         for index in range(tasks)
     ]
-    return fmean(rollout.progress for rollout in rollouts)
+    return [rollout.progress for rollout in rollouts]
 
 
 def _file_name(goal: str) -> str:

@@ -20,6 +20,7 @@ from slap_ros.api.acquisition import AcquisitionWatch, carry_out
 from slap_ros.api.growth import GrowthRequest, GrowthRound, TriedShortcut
 from slap_ros.api.growth_page import growth_page
 from slap_ros.api.training import Unwatched, train
+from slap_ros.errors import UnsolvableError
 from slap_ros.files import require_writable, sole_use, write_whole
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.policies.library_files import replace_folder
@@ -30,6 +31,7 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import SkillLibrary
 
 PAGE = "report.md"
+UNDER_WAY = ""  # reason of a growth that has not ended
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class Grown:
         rounds: Rounds, in order.
         best: Number of the best round, from 0; see
             :attr:`~slap_ros.api.growth.GrowthRound.rank`.
-        ended: Reason why there is no further round, in words.
+        ended: Reason why there is no further round, in words; empty while it goes on.
     """
 
     rounds: tuple[GrowthRound, ...]
@@ -78,9 +80,10 @@ def grow_rounds(
 ) -> Grown:
     """Acquire skills, learn shortcuts over them, and again, until plans get no shorter.
 
-    The libraries of the round with the shortest plans are in ``skills`` and ``shortcuts`` of the
-    folder, beside the page that says what each round has brought. Interrupted, it continues where
-    it was when it is called with the same request.
+    The libraries of the best round so far are in ``skills`` and ``shortcuts`` of the folder, beside
+    the page that says what each round has brought. Interrupted, it continues where it was when it
+    is called with the same request. A later round whose tasks have no plan is the last, and the
+    best before it counts.
 
     Args:
         request: Request: what is to grow, and how.
@@ -92,26 +95,73 @@ def grow_rounds(
 
     Raises:
         InvalidParameterError: The folder has another growth, or is damaged.
-        UnsolvableError: With the skills of a round, no task has a plan.
+        UnsolvableError: With the skills of the first round, no task has a plan.
         BusyError: Another process grows in the same folder.
     """
     require_writable(request.folder)
     with sole_use(request.folder):
         work = WorkFolder(request.folder)
         work.require_same({"command": request.command})
-        rounds: list[GrowthRound] = []
-        while not (ended := request.why_over(rounds)):
-            number = len(rounds)
-            one = work.cached(
-                f"round{number + 1}",
-                lambda: _carry_out_round(request, tuple(rounds), jobs, watch).as_json(),
-                GrowthRound.from_json,
-            )
-            rounds.append(one)
+        rounds = _finished_rounds(work)
+        for number, one in enumerate(rounds):
             watch.on_round(number, one)
+        while not (ended := request.why_over(rounds)):
+            try:
+                one = _next_round(request, work, rounds, jobs, watch)
+            except UnsolvableError as error:
+                if not rounds:
+                    raise
+                ended = f"round {len(rounds) + 1} led to nothing: {error}"
+                break
+            rounds.append(one)
+            _save(request, Grown(tuple(rounds), _best(rounds), UNDER_WAY))
+            watch.on_round(len(rounds) - 1, one)
         grown = Grown(tuple(rounds), _best(rounds), ended)
         _save(request, grown)
     return grown
+
+
+def _finished_rounds(work: WorkFolder) -> list[GrowthRound]:
+    """The rounds that an earlier run has finished, in order."""
+    rounds: list[GrowthRound] = []
+    while (work.path / f"{_round_name(len(rounds))}.json").exists():
+        rounds.append(work.cached(_round_name(len(rounds)), dict, GrowthRound.from_json))
+    return rounds
+
+
+def _next_round(
+    request: GrowthRequest,
+    work: WorkFolder,
+    before: Sequence[GrowthRound],
+    jobs: int | None,
+    watch: GrowthWatch,
+) -> GrowthRound:
+    """Carry out a round, and keep what it has brought.
+
+    Args:
+        request: What is to grow.
+        work: Folder of all results.
+        before: Earlier rounds.
+        jobs: Number of processes; None for this one.
+        watch: Functions that are called.
+
+    Raises:
+        UnsolvableError: With the skills of the round, no task has a plan.
+    """
+    return work.cached(
+        _round_name(len(before)),
+        lambda: _carry_out_round(request, before, jobs, watch).as_json(),
+        GrowthRound.from_json,
+    )
+
+
+def _round_name(number: int) -> str:
+    """The name of the file that says what a round has brought, without its ending.
+
+    Args:
+        number: Number of the round, from 0.
+    """
+    return f"round{number + 1}"
 
 
 def _best(rounds: Sequence[GrowthRound]) -> int:
@@ -137,12 +187,11 @@ def _carry_out_round(
         same = before[-1]
         return replace(_of_skills(acquired, same.length_alone, same.length), unsolved=same.unsolved)
     library, notes = _train(request, len(before), left, jobs, watch)
-    explored = int(library.record["environment_steps"]["exploring"])
     validation = library.record["validation"]
     return replace(
         _of_skills(acquired, validation["pure_planning"], validation["slap"]),
         tried=tuple(notes.tried),
-        shortcut_steps=explored + len(notes.tried) * request.training.total_steps,
+        shortcut_steps=int(library.record["environment_steps"]["spent"]),
         unsolved=notes.unsolved,
     )
 

@@ -53,7 +53,8 @@ class GrowthRound:
         length: Mean plan length with shortcuts, environment steps.
         tried: Shortcuts that were learned, in order.
         skill_steps: Environment steps that learning skills took.
-        shortcut_steps: Environment steps that exploring and learning shortcuts took.
+        shortcut_steps: Environment steps that exploring took, and learning all shortcuts that were
+            tried.
         unsolved: Number of validation tasks without a plan, over which lengths are no means.
     """
 
@@ -113,7 +114,8 @@ class GrowthRequest:
         skill_changes: Settings of skills to change, as texts.
         shortcut_settings: Name of the hyper-parameters of shortcuts.
         shortcut_changes: Settings of shortcuts to change, as texts.
-        steps: Environment steps for all rounds together.
+        steps: Environment steps of learning skills, of exploring and of learning shortcuts, all
+            rounds together.
 
     Raises:
         InvalidParameterError: They do not fit together, or the steps are too few for a round.
@@ -134,12 +136,13 @@ class GrowthRequest:
     steps: int = STEPS
 
     def __post_init__(self) -> None:
-        skills, shortcut = self.least_skill_steps, self.training.total_steps
-        if self.steps < skills + shortcut:
+        if self.steps < self.least_steps:
+            training = self.training
             raise InvalidParameterError(
                 f"{self.steps} environment steps are too few for a round: skills take at least "
-                f"{skills}, and a shortcut takes {shortcut}; give --steps {skills + shortcut} or "
-                "more"
+                f"{self.least_skill_steps}, random rollouts of exploration take "
+                f"{training.exploration.usual_steps}, and a shortcut takes {training.most_steps}; "
+                f"give --steps {self.least_steps} or more"
             )
 
     @property
@@ -156,7 +159,13 @@ class GrowthRequest:
     @property
     def least_steps(self) -> int:
         """Environment steps of a round at least: a skill is judged, and a shortcut is learned."""
-        return self.least_skill_steps + self.training.total_steps
+        return self.least_skill_steps + self.least_shortcut_steps
+
+    @property
+    def least_shortcut_steps(self) -> int:
+        """Environment steps until a shortcut is learned, exploration included."""
+        training = self.training
+        return training.exploration.usual_steps + training.most_steps
 
     def most_skill_steps(self, left: int) -> int:
         """Environment steps that skills may take in a round, which leave some for a shortcut.
@@ -165,7 +174,7 @@ class GrowthRequest:
             left: Environment steps that are left.
         """
         of_settings = replace(self.acquisition(0, self.steps), steps=None).chosen_settings()
-        return min(of_settings.total_steps, left - self.training.total_steps)
+        return min(of_settings.total_steps, left - self.least_shortcut_steps)
 
     def affordable_changes(self, left: int) -> list[str]:
         """The changes of settings of shortcuts, so that no more are learned than can be paid.
@@ -173,12 +182,9 @@ class GrowthRequest:
         Args:
             left: Environment steps that are left.
         """
-        settings = self.training
-        affordable = left // settings.total_steps
-        if affordable >= settings.shortcuts:
-            return list(self.shortcut_changes)
-        others = [text for text in self.shortcut_changes if not text.startswith("shortcuts=")]
-        return [*others, f"shortcuts={affordable}"]
+        given = self.training.budget
+        others = [text for text in self.shortcut_changes if not text.startswith("budget=")]
+        return [*others, f"budget={min(left, given) if given else left}"]
 
     def round_folder(self, number: int) -> Path:
         """The folder of a round.
@@ -254,10 +260,10 @@ class GrowthRequest:
             return "no skill learns from where shortcuts have led"
         if before and last.rank >= before[-1].rank:
             return "plans get no shorter"
-        if not any(one.kept for one in last.tried):
-            return "no shortcut makes plans shorter"
         if self.steps - sum(one.steps for one in rounds) < self.least_steps:
             return "the budget is spent"
+        if not any(one.kept for one in last.tried):
+            return "no shortcut makes plans shorter"
         return ""
 
 

@@ -24,10 +24,11 @@ def growth_page(
         request: What was to grow.
         rounds: Rounds, in order.
         best: Number of the round with the shortest plans, from 0.
-        ended: Reason why there was no further round, in words.
+        ended: Reason why there was no further round, in words; empty while it goes on.
     """
     domain, spent = request.domain, sum(one.steps for one in rounds)
     shortest = rounds[best]
+    over = f"It ended since {ended}." if ended else "It goes on with the same command."
     saved = 1.0 - shortest.length / shortest.length_alone if shortest.length_alone else 0.0
     sections = "".join(_section(number, one) for number, one in enumerate(rounds))
     return (
@@ -38,7 +39,7 @@ def growth_page(
         f"alone take {shortest.length_alone:.1f} (saved: {saved:.0%}). Lengths are means over the "
         "validation tasks that have a plan; training never sees them. A round is better where more "
         "of them have one, and among equals where plans are shorter. `skills` and `shortcuts` are "
-        f"the libraries of this round. It ended since {ended}, after {spent} of {request.steps} "
+        f"the libraries of this round. {over} The rounds took {spent} of {request.steps} "
         f"environment steps.\n{sections}"
     )
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -107,7 +108,7 @@ def acquire_sequence_command(options: SequenceOptions) -> int:
     found = {}
     for request in requests:
         seed, folder = request.acquisition.seed, request.acquisition.library_folder
-        steps = acquire_sequence(request, options.jobs, options.ray, watch)
+        steps = acquire_sequence(request, options.jobs, options.ray, watch, _tell_goal(request))
         found[str(seed)] = [step.as_json() for step in steps]
         _report(seed, folder, steps)
     if options.json:
@@ -115,12 +116,18 @@ def acquire_sequence_command(options: SequenceOptions) -> int:
     return 0
 
 
+def _tell_goal(request: SequenceRequest) -> Callable[[int, str], None]:
+    """What says which goal begins."""
+    seed, goals = request.acquisition.seed, len(request.goals)
+    return lambda number, goal: console.print(f"seed {seed}, goal {number + 1} of {goals}: {goal}")
+
+
 def _report(seed: int, folder: Path, steps: list[SequenceStep]) -> None:
     for step in steps:
-        *earlier, own = step.tried.values()
+        *earlier, own = step.solved.values()
         before = f", {min(earlier):.2f} or more on each goal before it" if earlier else ""
         console.print(
-            f"seed {seed}, {step.goal}: {step.steps} environment steps ({step.ended}); task "
-            f"progress {own:.2f}{before}"
+            f"seed {seed}, {step.goal}: {step.steps} environment steps ({step.ended}); success "
+            f"{own:.2f}{before}"
         )
     console.print(f"the library is in {folder}; `slap skills {folder}` shows it")

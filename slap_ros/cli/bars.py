@@ -27,16 +27,19 @@ class Bars(Progress):
     """Bars that go away when they are done; where stderr is no terminal, a line each, at times."""
 
     def __init__(
-        self, *columns: ProgressColumn, on: Console = console, log_period_s: float = LOG_PERIOD_S
+        self,
+        *columns: ProgressColumn,
+        on: Console | None = None,
+        log_period_s: float = LOG_PERIOD_S,
     ) -> None:
         """Show nothing yet.
 
         Args:
             columns: Columns of each bar.
-            on: Where they are shown.
+            on: Where they are shown; stderr if not given.
             log_period_s: Time between two lines about a bar, at least.
         """
-        super().__init__(*columns, console=on, transient=True)
+        super().__init__(*columns, console=on or console.rich, transient=True)
         self._log_period_s = log_period_s
         self._logged_s: dict[TaskID, float] = {}  # elapsed as a line was printed
 

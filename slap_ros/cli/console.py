@@ -14,23 +14,26 @@ import sys
 import tempfile
 import traceback
 import unicodedata
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
-from functools import wraps
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import Any, NoReturn, ParamSpec
+from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec
 
 import typer
-from rich.console import Console, ConsoleOptions, RenderableType
-from rich.segment import Segment
-from rich.text import Text
 
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.redaction import without_secrets
 from slap_ros.signals import TerminatedError, exit_code, forget_interrupt, signals_raised
 
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.status import Status
+    from rich.text import Text
+
+    from slap_ros.cli.plain_console import PlainConsole
+
 P = ParamSpec("P")
-FILE_WIDTH = 120  # columns, where stderr is no terminal: tables must not be cut there
 # Controls, invisible formatting (it reverses the writing direction), halves of characters.
 HIDDEN_CATEGORIES = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
@@ -45,31 +48,34 @@ def visible(text: str) -> str:
     )
 
 
-class PlainConsole(Console):
-    """A console on which texts are data; style comes from :func:`styled` alone."""
+class Stderr:
+    """Prints for people: sentences as they are, tables and what has style by rich.
 
-    def __init__(self) -> None:
-        at_a_terminal = sys.stderr is not None and sys.stderr.isatty()
-        width = None if at_a_terminal else FILE_WIDTH
-        super().__init__(
-            stderr=True, soft_wrap=True, width=width, markup=False, highlight=False, emoji=False
-        )
+    Importing rich takes longer than some commands. It is imported for what needs it, and from then
+    on prints everything, since it may be drawing a bar that a sentence would break.
+    """
 
-    def render_str(self, text: str, **options: Any) -> Text:
-        """A text as data; made visible here already, before its width is measured."""
-        return super().render_str(visible(text), **options)
+    def print(self, what: RenderableType = "") -> None:
+        """Print a sentence, a table, or anything else that rich can print."""
+        if isinstance(what, str) and sys.stderr is not None and "rich" not in self.__dict__:
+            sys.stderr.write(f"{visible(what)}\n")
+            sys.stderr.flush()
+        else:
+            self.rich.print(what)
 
-    def render(
-        self, renderable: RenderableType, options: ConsoleOptions | None = None
-    ) -> Iterable[Segment]:
-        """What is printed, in segments; those of text made visible."""
-        for segment in super().render(renderable, options):
-            if segment.control is None and not segment.text.isprintable():
-                segment = segment._replace(text=visible(segment.text))
-            yield segment
+    def status(self, what: str) -> Status:
+        """Show what is being done, while it is."""
+        return self.rich.status(what)
+
+    @cached_property
+    def rich(self) -> PlainConsole:
+        """For bars, and whatever else changes while it is seen."""
+        from slap_ros.cli.plain_console import PlainConsole
+
+        return PlainConsole()
 
 
-console = PlainConsole()
+console = Stderr()
 
 
 def styled(label: str, style: str, rest: str = "") -> Text:
@@ -83,6 +89,8 @@ def styled(label: str, style: str, rest: str = "") -> Text:
     Returns:
         Both, to be printed.
     """
+    from rich.text import Text
+
     return Text.assemble((visible(label), style), visible(rest))
 
 

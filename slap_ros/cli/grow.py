@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from slap_ros.acquisition.proposals.attempt_log import Entry
 from slap_ros.acquisition.proposals.proposer_names import MANUAL
 from slap_ros.acquisition.training.settings import ACQUISITION_SETTINGS
 from slap_ros.api.acquisition import AcquisitionWatch, acquirable
@@ -19,12 +22,14 @@ from slap_ros.api.growth import STEPS, GrowthRequest, GrowthRound
 from slap_ros.cli.acquisition_bars import AcquisitionBars
 from slap_ros.cli.acquisition_events import AcquisitionEvents
 from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.growth_events import GrowthEvents, ShortcutEvents
 from slap_ros.cli.options import Goal, Json
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.cli.train import training_bars
 from slap_ros.cli.training_options import BeginWith, Rewarder, TrainingSeed, setting_changes
 from slap_ros.shortcuts.settings import NEAR
+from slap_ros.shortcuts.training import TrainingCallback
 
 ROOM = Path("runs/grown")
 
@@ -64,9 +69,16 @@ class GrowOptions:
     ] = NEAR
     set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None
     steps: Annotated[
-        int, typer.Option(min=1, help="Environment steps of training, all rounds together.")
+        int,
+        typer.Option(
+            min=1, help="Environment steps of learning and exploring, all rounds together."
+        ),
     ] = STEPS
     jobs: Jobs = 2
+    events: Annotated[
+        bool,
+        typer.Option("--events", help="Print every event on stdout, as one line of JSON."),
+    ] = False
     json: Json = False
 
     def request(self, proposers: ProposerOptions) -> GrowthRequest:
@@ -102,15 +114,9 @@ def grow(options: GrowOptions, proposers: ProposerOptions) -> int:
     interruption, the same command goes on where it stopped.
     """
     request = options.request(proposers)
-    events = AcquisitionEvents(None)
-    watch = GrowthWatch(
-        AcquisitionWatch(
-            on_attempt=show_entry, curriculum=lambda: AcquisitionBars(events), tell=warn
-        ),
-        training_bars,
-        _show_round,
-    )
-    grown = grow_rounds(request, options.jobs, watch)
+    events = GrowthEvents(options.events)
+    grown = grow_rounds(request, options.jobs, _watch(request, events))
+    events.grown(request.folder, grown)
     if options.json:
         print_json(grown.as_json())
     console.print(
@@ -118,6 +124,37 @@ def grow(options: GrowOptions, proposers: ProposerOptions) -> int:
         f"shortcuts and {PAGE} are in {request.folder}"
     )
     return 0
+
+
+def _watch(request: GrowthRequest, events: GrowthEvents) -> GrowthWatch:
+    """What shows people how far growing is, and prints events.
+
+    Args:
+        request: What is to grow.
+        events: Prints events.
+    """
+    of_skills = AcquisitionEvents(request.least_skill_steps if events.printed else None)
+
+    def show_attempt(entry: Entry) -> None:
+        show_entry(entry)
+        of_skills.attempted(entry)
+
+    def show_round(number: int, one: GrowthRound) -> None:
+        _show_round(number, one)
+        events.on_round(number, one)
+
+    @contextmanager
+    def shortcuts() -> Iterator[TrainingCallback]:
+        with training_bars() as bars:
+            yield ShortcutEvents(events, bars)
+
+    skills = AcquisitionWatch(
+        on_attempt=show_attempt,
+        on_proposal=of_skills.proposed,
+        curriculum=lambda: AcquisitionBars(of_skills),
+        tell=warn,
+    )
+    return GrowthWatch(skills, shortcuts, show_round)
 
 
 def _show_round(number: int, one: GrowthRound) -> None:

@@ -92,6 +92,12 @@ class LanguageSettings:
         if not self.answer_seconds > 0:
             raise InvalidParameterError(f"answer_seconds is {self.answer_seconds}; at least some")
 
+    @property
+    def asks_a_server(self) -> bool:
+        """Whether a server is asked: not weights in this process, and not a person."""
+        elsewhere = self.base_url.startswith((LOCAL_SCHEME, FOLDER_SCHEME))
+        return not elsewhere and asked_by_hand(self.model) is None
+
 
 def read_settings(
     file: Path | None = None,

@@ -27,6 +27,7 @@ ZERO_TOO = frozenset(
     {
         "also_repeat",
         "alternatives",
+        "budget",
         "cloning_steps",
         "critic_updates",
         "inside",

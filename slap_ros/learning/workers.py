@@ -15,6 +15,7 @@ from time import sleep
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.finished_jobs import FinishedJobs
 from slap_ros.learning.progress_callback import ProgressCallback
 from slap_ros.signals import signals_held_back
 
@@ -158,6 +159,7 @@ def run_in_order(
     jobs: Sequence[tuple[Any, ...]],
     what: str,
     callback: ProgressCallback,
+    finished: FinishedJobs | None = None,
 ) -> list[Result]:
     """Run a function once per job, wherever and in whichever order they end.
 
@@ -167,13 +169,21 @@ def run_in_order(
         jobs: Arguments of the function, one tuple per job.
         what: Name of the step that the jobs are, in words.
         callback: Callback that is told before the first job and after each.
+        finished: Jobs that have ended already, which are not run again; each that ends is added.
+            None to run them all and keep none.
 
     Returns:
         The results in the order of the jobs.
     """
-    results: dict[int, Result] = {}
+    results: dict[int, Result] = finished.of(what) if finished is not None else {}
     callback.on_progress(what, 0, len(jobs))
-    for number, result in workers.run(function, jobs):
+    if results:
+        callback.on_progress(what, len(results), len(jobs))
+    left = [number for number in range(len(jobs)) if number not in results]
+    for place, result in workers.run(function, [jobs[number] for number in left]):
+        number = left[place]
+        if finished is not None:
+            finished.add(what, number, result)
         results[number] = result
         callback.on_progress(what, len(results), len(jobs))
-    return [results[number] for number in sorted(results)]
+    return [results[number] for number in range(len(jobs))]

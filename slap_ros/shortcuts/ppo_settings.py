@@ -32,3 +32,8 @@ class PpoSettings:
             raise InvalidParameterError(
                 f"{self.n_envs} environments cannot be divided into {self.parts} equal parts"
             )
+
+    @property
+    def rollout_steps(self) -> int:
+        """Environment steps between updates, all environments together."""
+        return self.n_envs * self.n_steps

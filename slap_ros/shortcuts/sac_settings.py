@@ -44,3 +44,8 @@ class ShortcutSacSettings:
     hindsight: float = 0.0
     net_arch: tuple[int, ...] = (64, 64)
     total_steps: int = 200_000
+
+    @property
+    def rollout_steps(self) -> int:
+        """Environment steps between updates, all environments together."""
+        return self.n_envs * self.train_freq

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import Any
 
 from slap_ros.core import Domain, SettingValue
@@ -50,6 +51,16 @@ class ExplorationSettings:
     pushes: int = 0
     inside: int = 0
     beyond: bool = False
+
+    @property
+    def usual_steps(self) -> int:
+        """Environment steps of random rollouts from where skills end, in all tasks together.
+
+        Exploration may take fewer, where rollouts fail early, and more, where it does more than
+        that.
+        """
+        batches = 2 if self.also_repeat else 1
+        return self.tasks * self.nodes * batches * self.rollouts * self.length
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
@@ -115,6 +126,8 @@ class TrainingSettings:
         sac: Settings of SAC, which learns in the place of PPO, in a single stage; None for PPO.
         together: Number of shortcuts that one policy learns (:mod:`slap_ros.shortcuts.subgoals`);
             1 for a policy each.
+        budget: Environment steps of exploring and of learning all shortcuts together; no shortcut
+            is begun that could take more. 0 for no such limit.
     """
 
     exploration: ExplorationSettings = field(default_factory=ExplorationSettings)
@@ -133,6 +146,7 @@ class TrainingSettings:
     stopping: Stopping | None = None
     sac: ShortcutSacSettings | None = None
     together: int = 1
+    budget: int = 0
 
     @property
     def stages(self) -> tuple[PpoSettings | ShortcutSacSettings, ...]:
@@ -150,6 +164,18 @@ class TrainingSettings:
     def total_steps(self) -> int:
         """Environment steps that a shortcut is trained for, in all stages together."""
         return sum(stage.total_steps for stage in self.stages)
+
+    @property
+    def most_steps(self) -> int:
+        """Environment steps that a shortcut takes if its first stage is learned in all attempts.
+
+        A stage ends with the rollout in which its steps are reached.
+        """
+        each = [
+            ceil(stage.total_steps / stage.rollout_steps) * stage.rollout_steps
+            for stage in self.stages
+        ]
+        return sum(each) + (self.attempts - 1) * each[0]
 
     def with_total_steps(self, steps: int) -> TrainingSettings:
         """As many environment steps in all, shared among the stages as they are now.
@@ -174,11 +200,12 @@ class TrainingSettings:
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
 
-        A single attempt, no other goals, no rule that ends learning, no SAC and a policy for each
-        shortcut are left out, as work folders have it from when there was no other way.
+        A single attempt, no other goals, no rule that ends learning, no SAC, a policy for each
+        shortcut and no budget are left out, as work folders have it from when there was no other
+        way.
         """
         data = stored(self)
-        for name in ("attempts", "random_goals", "stopping", "sac", "together"):
+        for name in ("attempts", "random_goals", "stopping", "sac", "together", "budget"):
             if getattr(self, name) == getattr(OURS, name):
                 del data[name]
         return data

@@ -176,6 +176,8 @@ class SubgoalTraining(Training):
         """Learn the most promising groups together, and keep each that shortens plans."""
         chosen: dict[CandidateGroup, tuple[StartRecord, ...]] = {}
         while len(chosen) < min(self.settings.together, self.settings.shortcuts):
+            if not self._affords(len(chosen) + 1):
+                break
             group = self._most_promising(ranked, list(chosen))
             if group is None:
                 break
@@ -192,6 +194,7 @@ class SubgoalTraining(Training):
             str(self.folder / "together"),
         )
         learned = self._run_attempt(learn_together, attempt)
+        self._spent += sum(int(one.record["environment_steps"]) for one in learned)
         for group, shortcut in zip(chosen, learned, strict=True):
             length = self._judge(with_origin(shortcut, group), length)
         return length

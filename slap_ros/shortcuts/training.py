@@ -15,6 +15,7 @@ from statistics import fmean
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import UnsolvableError
+from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
 from slap_ros.learning.progress_callback import ProgressCallback
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.task_range import TaskRange
@@ -181,12 +182,13 @@ class Training:
     callback: TrainingCallback
     _shortcuts: list[Shortcut] = field(default_factory=list, init=False)
     _validation: list[int] = field(default_factory=list, init=False)  # tasks that have a plan
+    _spent: int = field(default=0, init=False)  # environment steps of exploring and learning
 
     def __post_init__(self) -> None:
         self._work = WorkFolder(self.folder)
 
     def run(self) -> ShortcutLibrary:
-        """Train until the budget is spent, or go on where an earlier run ended.
+        """Train until nothing else is worth learning, or go on where an earlier run ended.
 
         Raises:
             ChildProcessError: A process that stepped environments has ended.
@@ -198,6 +200,7 @@ class Training:
         self._require_same_settings()
         length = baseline = self._validate_without()
         explored = self._explore()
+        self._spent = sum(result.environment_steps for result in explored)
         ranked = rank(explored)
         self.callback.on_ranked(ranked)
         operator_steps = mean_steps(explored)
@@ -220,6 +223,8 @@ class Training:
         """
         kept: list[CandidateGroup] = []
         for _ in range(self.settings.shortcuts):
+            if not self._affords(1):
+                break
             group = self._most_promising(ranked, kept)
             if group is None:
                 break
@@ -228,6 +233,11 @@ class Training:
             if length < before:
                 kept.append(group)
         return length
+
+    def _affords(self, shortcuts: int) -> bool:
+        """Whether so many shortcuts can still be learned within the budget."""
+        needed = self._spent + shortcuts * self.settings.most_steps
+        return not self.settings.budget or needed <= self.settings.budget
 
     def _most_promising(
         self, groups: Sequence[CandidateGroup], kept: Sequence[CandidateGroup]
@@ -263,7 +273,9 @@ class Training:
         starts = self._starts(group, operator_steps)
         if not starts:  # it can begin in no task
             return length
-        return self._judge(with_origin(self._learn(group.signature, starts), group), length)
+        learned = self._learn(group.signature, starts)
+        self._spent += int(learned.record.get("environment_steps", 0))
+        return self._judge(with_origin(learned, group), length)
 
     def _judge(self, shortcut: Shortcut, length: float) -> float:
         """Keep a shortcut if it shortens plans.
@@ -295,7 +307,8 @@ class Training:
         self._work.require_same({"place": self.distribution.as_json(), **self.settings.as_json()})
 
     def _explore(self) -> list[ExplorationResult]:
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             "explored",
             self._explore_what_can_be,
             lambda data: [ExplorationResult.from_json(result) for result in data],
@@ -307,10 +320,10 @@ class Training:
         jobs.STARTS.batch(0, self.settings.starts)
         jobs.VALIDATION.batch(0, self.settings.validation)
 
-    def _explore_what_can_be(self) -> list[Any]:
+    def _explore_what_can_be(self, finished: FinishedJobs) -> list[Any]:
         tasks = self.settings.exploration.tasks
         work = [(self._any_goal, i, self.settings.exploration) for i in range(tasks)]
-        found = self._run("exploring tasks", jobs.try_to_explore, work)
+        found = self._run("exploring tasks", jobs.try_to_explore, work, finished)
         self._leave_out(jobs.EXPLORATION, found)
         return [result for result in found if not isinstance(result, str)]
 
@@ -359,9 +372,10 @@ class Training:
             )
             for i in range(self.settings.starts)
         ]
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             f"{name}/starts",
-            lambda: self._run("collecting starts", jobs.start, work),
+            lambda finished: self._run("collecting starts", jobs.start, work, finished),
             lambda data: tuple(StartRecord.from_json(one) for one in data if one is not None),
         )
 
@@ -422,15 +436,22 @@ class Training:
         """Steps of a plan for each of these validation tasks, or why there is none."""
         work = [(self._any_goal, i, shortcuts, self.settings.sampling) for i in tasks]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             name,
-            lambda: self._run("planning", jobs.plan_length, work),
+            lambda finished: self._run("planning", jobs.plan_length, work, finished),
             lambda data: _decode_lengths(data, len(work)),
         )
 
-    def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
+    def _run(
+        self,
+        what: str,
+        function: Any,
+        work: Sequence[tuple[Any, ...]],
+        finished: FinishedJobs,
+    ) -> list[Any]:
         """The results of a step's jobs, in their order."""
-        return run_in_order(self.workers, function, work, what, self.callback)
+        return run_in_order(self.workers, function, work, what, self.callback, finished)
 
     def _record(
         self, explored: Sequence[ExplorationResult], baseline: float, length: float
@@ -443,6 +464,7 @@ class Training:
             "environment_steps": {
                 "exploring": sum(result.environment_steps for result in explored),
                 "learning": sum(steps),
+                **({"spent": self._spent} if self.settings.budget else {}),
             },
             "settings": self.settings.as_json(),
             "versions": dict(versions()),

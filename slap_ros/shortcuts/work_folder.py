@@ -7,6 +7,7 @@
     runs/models/obstacle2d-training/
       settings.json              what the training is of
       explored.json, plans.json  results of its steps
+      .explored.jsonl            tasks of a step that is under way, as they end
       Clear_On-e41568a9/         a shortcut being learned
         starts.json
         progress.jsonl, plan_lengths.jsonl, tensorboard/, checkpoint0.pt

@@ -101,6 +101,7 @@ def test_bounds_are_never_above_the_steps_that_skills_take(library, seed, choice
         state = rollout.final
 
 
+@pytest.mark.slow
 def test_evaluation_records_the_library_and_is_the_same_in_other_processes(library, tmp_path):
     output = tmp_path / "evaluation.json"
     arguments = ["--goal", "swapped", "--tasks", 2, "--seeds", 1, "--output", output]

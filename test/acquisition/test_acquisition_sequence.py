@@ -39,7 +39,9 @@ def test_a_second_goal_is_learned_with_the_skills_of_the_first(tmp_path, monkeyp
     assert set(first["learned"]) == {"Pick", "Put"}
     assert list(second["tried"]) == ["train", "swapped"]
     assert second["steps"] <= 0.5 * first["steps"]
-    assert second["tried"]["train"] >= first["tried"]["train"] - 0.25
+    assert second["solved"]["train"] >= first["solved"]["train"] - 0.25
+    assert first["retrieved"] == {}
+    assert set(second["retrieved"]) == set(second["learned"])
     record = json.loads((tmp_path / "library" / "library.json").read_text())
     assert record["sequence"] == {"scratch": False, "goals": steps}
     monkeypatch.setattr(jobs, "learn", None)  # nothing is learned when it is asked for again

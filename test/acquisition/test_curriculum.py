@@ -274,9 +274,10 @@ def test_the_library_is_the_same_after_interruptions(tmp_path, monkeypatch):
 @pytest.mark.training
 @pytest.mark.slow
 def test_the_library_is_the_same_with_two_processes(tmp_path):
-    one = saved(acquire(tmp_path / "one", SHORT)[0], tmp_path / "first")
+    brief = replace(SHORT, total_steps=800)
+    one = saved(acquire(tmp_path / "one", brief)[0], tmp_path / "first")
     with local_workers(2) as workers:
-        two = saved(acquire(tmp_path / "two", SHORT, workers=workers)[0], tmp_path / "second")
+        two = saved(acquire(tmp_path / "two", brief, workers=workers)[0], tmp_path / "second")
     assert one == two
 
 
@@ -394,6 +395,7 @@ def test_where_all_skills_are_there_nothing_is_learned(tmp_path):
     assert library.digest == load_skill_library(tmp_path / "both", POINTS).digest
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_a_skill_that_fails_again_is_learned_further(tmp_path):
     """From its own weights; what it was worth stays a candidate."""

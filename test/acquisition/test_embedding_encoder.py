@@ -184,6 +184,8 @@ def test_new_skills_begin_with_those_that_the_server_finds_alike(
     [
         (["--encoder", "words"], "--encoder is for --from"),
         (["--encoder", "words", "--from", ".", "--base-url", "local:x"], "asks a server"),
+        (["--encoder", "words", "--from", ".", "--base-url", "folder:x"], "folder:x is not one"),
+        (["--encoder", "ask:somebody", "--from", "."], "ask:somebody at"),
     ],
 )
 def test_an_encoder_without_use_or_server_is_refused(tmp_path, options, reason):

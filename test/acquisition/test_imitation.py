@@ -138,6 +138,7 @@ def study(output, *arguments):
     return CliRunner().invoke(app, list(map(str, words)))
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)  # clones both skills with as many updates as figures have
 @pytest.mark.usefixtures("points_installed")
 def test_the_study_puts_skills_and_clones_side_by_side(tmp_path):

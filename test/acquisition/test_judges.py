@@ -15,6 +15,7 @@ from slap_ros.acquisition.training.judges import JudgeElsewhere
 from slap_ros.acquisition.training.sac import SkillLearner
 from slap_ros.acquisition.training.sac_settings import SacSettings
 from slap_ros.acquisition.training.settings import AcquisitionSettings
+from support.marks import slow
 from support.points import POINTS, REWARDS
 
 pytestmark = pytest.mark.usefixtures("points_installed")
@@ -41,7 +42,7 @@ def files(folder):
 
 
 @pytest.mark.training
-@pytest.mark.parametrize(("enough", "segments"), [(0.0, 1), (2.0, SEGMENTS)])
+@pytest.mark.parametrize(("enough", "segments"), [(0.0, 1), *slow((2.0, SEGMENTS))])
 def test_a_round_is_the_same_whoever_judges_it(tmp_path, enough, segments):
     """Also where two good judgements in a row end it."""
     settings = replace(SETTINGS, enough=enough)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A curriculum whose process is killed ten times, at random moments."""
+"""A curriculum whose process is killed five times, at random moments."""
 
 import subprocess
 
@@ -19,16 +19,16 @@ def files(folder):
 
 @pytest.mark.training
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # six trainings' worth of processor time
-def test_killed_ten_times_it_makes_the_same_library_to_the_byte(tmp_path):
+@pytest.mark.timeout(300)  # four trainings' worth of processor time
+def test_killed_five_times_it_makes_the_same_library_to_the_byte(tmp_path):
     """And the same work folder: plans carried out, episodes, judgements."""
     ran = subprocess.run(
         [*program("killed_training"), tmp_path], env=environment(), capture_output=True, text=True
     )
     assert ran.returncode == 0, ran.stderr
     kills = (tmp_path / "kills").read_text().splitlines()
-    assert len(kills) == 10
-    assert len(set(kills)) > 2  # at different stages
+    assert len(kills) == 5
+    assert len(set(kills)) > 1  # at different stages
     undisturbed = files(tmp_path / "undisturbed")
     assert {"library/library.json", "work/Put/rounds.json"} <= set(undisturbed)
     disturbed = list(tmp_path.glob("killed*"))

@@ -50,6 +50,7 @@ def test_figures_are_those_of_the_command(tmp_path):
         assert sum(row["failures"].values()) == sum(not trial["success"] for trial in trials)
 
 
+@pytest.mark.slow
 def test_the_first_library_has_the_tasks_of_all_seeds_and_what_fails_is_said(tmp_path):
     good = write_library(tmp_path / "good")
     bad = write_library(tmp_path / "bad", PICKING, DROPPING)

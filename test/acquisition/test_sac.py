@@ -23,6 +23,7 @@ from slap_ros.relational import RewardTemplate
 from slap_ros.skills.groundings import Groundings
 from slap_ros.skills.observations import SIZE
 from slap_ros.skills.reward import SkillReward
+from support.marks import slow
 from support.points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 
 QUICK = replace(SMALL, learning_starts=192)
@@ -51,7 +52,7 @@ def success(policy):
 
 
 @pytest.mark.training
-@pytest.mark.parametrize("task", ["Pendulum-v1", "MountainCarContinuous-v0"])
+@pytest.mark.parametrize("task", ["Pendulum-v1", *slow("MountainCarContinuous-v0")])
 def test_an_update_is_stable_baselines3s_up_to_rounding(task):
     kwargs = {
         "learning_starts": 100,

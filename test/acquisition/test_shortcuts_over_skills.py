@@ -26,7 +26,7 @@ from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.api.training import Unwatched
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode, InvalidParameterError, SkillsChangedError
+from slap_ros.errors import ErrorCode, InvalidParameterError, SkillsChangedError, UnsolvableError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import solve
 from slap_ros.learning.task_distribution import TaskDistribution
@@ -44,14 +44,10 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.comparison import PlanningSetup
 from slap_ros.studies.slap.planning_time import plan_once
 from support.points import REWARDS
+from support.points_training import SMALL
 from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
-SMALL = [
-    "polish=none", "ppo.total_steps=6144", "starts=24", "validation=3", "shortcuts=1",
-    "exploration.tasks=3", "exploration.nodes=1", "exploration.rollouts=128",
-    "exploration.action_repeat=3", "exploration.length=20",
-]  # fmt: skip
 CHANGES = [word for change in SMALL for word in ("--set", change)]
 
 
@@ -230,6 +226,7 @@ def test_what_was_checked_is_the_shortcuts_that_were_there(trained, tmp_path):
         assert not load_library(library, points).usable_over(other)
 
 
+@pytest.mark.slow
 def test_shortcuts_that_always_fail_leave_the_plans_of_the_skills(trained):
     """To the step, in each of several tasks; and the paper's search finds the same lengths."""
     domain = open_domain(DomainChoice("points", "line", str(trained.folder / "steady")))
@@ -331,11 +328,96 @@ def test_what_grows_is_what_the_other_commands_make_interrupted_or_not(trained, 
     grown_there, made_there = folder / "shortcuts" / policy, trained.folder / "library" / policy
     assert grown_there.read_bytes() == made_there.read_bytes()
     page = (folder / "report.md").read_text()
-    assert tried.name in page and str(tmp_path) not in page
+    assert tried.name in page and str(tmp_path) not in page and "It ended since" in page
+    taken = load_library(folder / "shortcuts", request.domain).record["environment_steps"]
+    assert grown.rounds[0].shortcut_steps == taken["exploring"] + taken["learning"]
+    assert sum(one.steps for one in grown.rounds) <= request.steps
     before = contents(folder)
     assert grow_rounds(request) == grown and contents(folder) == before
+    told = events_of_growth(folder, request)
+    assert contents(folder) == before
+    assert [one["event"] for one in told] == ["round", "round", "grown"]
+    assert told[0]["shortcuts"] == [tried.name] and told[0]["length"] == tried.after
+    assert Path(told[-1]["shortcut_library"]) == folder / "shortcuts"
+    assert told[-1]["steps"] == told[0]["steps"] + told[1]["steps"] and told[-1]["best"] == 1
     with pytest.raises(InvalidParameterError, match="has a training with other settings"):
         grow_rounds(replace(request, seed=1))
+
+
+def events_of_growth(folder, request):
+    """What `slap grow` says to another process."""
+    answer = slap(
+        "grow", "points", "--preset", "line", "--output", folder, "--keep", request.keep,
+        "--set-skills", "rollouts=2", "--set-skills", "validation=2", "--settings", "ours",
+        *CHANGES, "--steps", request.steps, "--jobs", 1, "--events",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.output
+    return list(map(json.loads, answer.stdout.splitlines()))
+
+
+class EndedAfterRoundError(Exception):
+    """Whatever ends a command after a round."""
+
+
+def no_round_after(number, _):
+    raise EndedAfterRoundError(number)
+
+
+NOTHING_TO_DO = "(and (HandEmpty ))"  # no skill is tried, so none fails and none is learned
+
+
+def test_a_later_round_without_a_plan_leaves_the_best_so_far(trained, tmp_path):
+    """Its skills are gone wrong: with them no plan reaches the goal in the model."""
+    folder = tmp_path / "grown"
+    request = GrowthRequest(
+        get_domain("points", "line"), folder, keep=trained.folder / "steady", goal=NOTHING_TO_DO,
+        skill_changes=["rollouts=2", "validation=2"],
+        shortcut_settings="ours", shortcut_changes=SMALL, steps=100_000,
+    )  # fmt: skip
+    with pytest.raises(EndedAfterRoundError):
+        grow_rounds(request, watch=GrowthWatch(on_round=no_round_after))
+    assert "It goes on with the same command." in (folder / "report.md").read_text()
+    best = [contents(folder / name) for name in ("skills", "shortcuts")]
+    assert best == [contents(folder / "round1" / name) for name in ("skills", "shortcuts")]
+    spoil(folder / "round1")
+    seen = []
+    grown = grow_rounds(request, watch=GrowthWatch(on_round=lambda number, _: seen.append(number)))
+    assert seen == [0] and len(grown.rounds) == 1 and grown.best == 0
+    assert grown.ended.startswith("round 2 led to nothing: none of 3 tasks for validation has")
+    assert grown.ended in (folder / "report.md").read_text()
+    assert contents(folder / "shortcuts") == contents(folder / "round1/shortcuts")
+    with pytest.raises(UnsolvableError):  # where there is nothing to keep
+        grow_rounds(replace(request, folder=tmp_path / "first", keep=folder / "round1/skills"))
+    assert not (tmp_path / "first/report.md").exists()
+
+
+def spoil(first_round):
+    """Skills of a round are replaced by others, which the next round keeps."""
+    digest = json.loads((first_round.with_suffix(".json")).read_text())["skills_digest"]
+    shutil.rmtree(first_round / "skills")
+    write_library(first_round / "skills", PICKING, replace(PUTTING, horizon=1))
+    points = open_domain(DomainChoice("points", "line", str(first_round / "skills")))
+    record = first_round / "shortcuts/library.json"
+    record.write_text(record.read_text().replace(digest, points.configuration["skills_digest"]))
+
+
+def test_a_budget_is_that_of_exploring_and_of_all_shortcuts_together(trained, tmp_path):
+    """Exploring leaves too little for a shortcut: none is begun, however promising it is."""
+    skills = trained.folder / "steady"
+    explored = json.loads(trained.answer.stdout)["environment_steps"]["exploring"]
+    budget = explored + 6144 - 1
+    work = shutil.copytree(trained.folder / "library-training", tmp_path / "work")
+    (work / "settings.json").unlink()  # what was explored is the same
+    answer = train(skills, tmp_path / "library", "--work", work, "--set", f"budget={budget}")
+    assert answer.exit_code == 0, answer.output
+    record = json.loads(answer.stdout)
+    assert record["environment_steps"] == {"exploring": explored, "learning": 0, "spent": explored}
+    assert record["validation"]["slap"] == record["validation"]["pure_planning"]
+    (work / "settings.json").unlink()
+    answer = train(skills, tmp_path / "paid", "--work", work, "--set", f"budget={budget + 1}")
+    taken = json.loads(answer.stdout)["environment_steps"]
+    assert taken["spent"] == taken["exploring"] + taken["learning"] <= budget + 1
+    assert "spent" not in json.loads(trained.answer.stdout)["environment_steps"]
 
 
 def grown_round(digest, unsolved, length, kept=True):
@@ -355,6 +437,8 @@ def test_a_round_that_solves_more_tasks_is_better_though_its_plans_are_longer():
     weak, able = grown_round("1", 3, 40.0), grown_round("2", 0, 50.0)
     assert request.why_over([weak, able]) == ""
     assert request.why_over([able, replace(weak, skills_digest="3")]) == "plans get no shorter"
+    spent = replace(able, skill_steps=90_000, tried=())  # no shortcut could be paid
+    assert request.why_over([spent]) == "the budget is spent"
     shorter = grown_round("3", 0, 45.0, kept=False)
     assert request.why_over([able, shorter]) == "no shortcut makes plans shorter"
     assert min((weak, able, shorter), key=lambda one: one.rank) is shorter
@@ -375,10 +459,12 @@ def test_a_budget_below_a_round_is_refused_with_what_a_round_takes(tmp_path):
     answer = slap(*asked, "--settings", "ours", "--steps", 6000)
     assert answer.exit_code == ErrorCode.INVALID_PARAMETER
     said = " ".join(answer.stderr.split())
-    assert "too few for a round" in said and "a shortcut takes 6144; give --steps" in said
+    assert "too few for a round" in said and "of exploration take 7680, and a shortcut" in said
+    assert "a shortcut takes 6144; give --steps" in said
     assert not (tmp_path / "grown").exists()
 
 
+@pytest.mark.slow
 def test_an_evaluation_against_skills_names_them_and_both_digests(trained, tmp_path):
     skills, library = trained.folder / "steady", trained.folder / "library"
     given = ["--preset", "line", "--skills", skills, "--tasks", 2, "--seeds", 1]

@@ -37,23 +37,23 @@ def test_ppo_takes_a_block(tmp_path):
     assert success("ppo", EASY, HOLDING, 12_000, changes, tmp_path) >= 0.5
 
 
-@pytest.mark.slow  # 1,500 updates of actor and critics
+@pytest.mark.slow  # 1,100 updates of actor and critics
 @pytest.mark.training
 @pytest.mark.timeout(300)
 def test_sac_with_hindsight_takes_a_block(tmp_path):
-    assert success("sac-her", EASY, HOLDING, 4_000, QUICK_SAC, tmp_path) >= 0.5
-
-
-@pytest.mark.slow  # 12,000 environment steps, one after the other
-@pytest.mark.training
-@pytest.mark.timeout(180)
-def test_hierarchical_learning_finds_the_four_skills_of_a_task(tmp_path):
-    assert success("hierarchical", "paper", None, 12_000, {}, tmp_path) >= 0.5
+    assert success("sac-her", EASY, HOLDING, 3_000, QUICK_SAC, tmp_path) >= 0.5
 
 
 @pytest.mark.slow  # 6,000 environment steps, one after the other
 @pytest.mark.training
 @pytest.mark.timeout(180)
+def test_hierarchical_learning_finds_the_four_skills_of_a_task(tmp_path):
+    assert success("hierarchical", "paper", None, 6_000, {}, tmp_path) >= 0.5
+
+
+@pytest.mark.slow  # 3,000 environment steps, one after the other
+@pytest.mark.training
+@pytest.mark.timeout(180)
 def test_a_controller_of_options_takes_a_block(tmp_path):
     """By the skill that does it, not by one of the options, which are not learned yet."""
-    assert success("sol", EASY, HOLDING, 6_000, {}, tmp_path) >= 0.5
+    assert success("sol", EASY, HOLDING, 3_000, {}, tmp_path) >= 0.5

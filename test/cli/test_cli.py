@@ -266,7 +266,7 @@ def test_what_cannot_be_rendered_is_refused_before_anything_runs(tmp_path):
 @pytest.mark.slow
 def test_a_recorded_tower_is_rendered_frame_by_frame(network, tmp_path):
     bag, gif, mp4 = tmp_path / "bag", tmp_path / "run.gif", tmp_path / "run.mp4"
-    goal = ("--goal", "(Holding robot block1)")
+    goal = ("--goal", "(Holding robot block4)")
     run = slap_alone(
         "run",
         "obstacle_tower",

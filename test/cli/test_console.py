@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 from typer.testing import CliRunner
 
-from slap_ros.cli.console import console, exits, styled, visible
+from slap_ros.cli.console import Stderr, console, exits, styled, visible
 from slap_ros.errors import ErrorCode, InvalidParameterError
 
 HOSTILE = "[/x] [bold]b[/bold] :smile: \x1b[31mred\x07 \u202egnirts \udcff end"
@@ -22,13 +22,22 @@ SHOWN = r"[/x] [bold]b[/bold] :smile: \x1b[31mred\x07 \u202egnirts \udcff end"
 def test_texts_are_neither_markup_nor_control(capsys):
     table = Table("column", title=HOSTILE)
     table.add_row(HOSTILE)
-    with console.capture() as capture:
+    with console.rich.capture() as capture:
         console.print(HOSTILE)
         console.print(table)
         console.print(styled("error", "bold red", f" {HOSTILE}"))
     printed = capture.get()
     assert printed.count(SHOWN) == 4
     assert not set(printed) & set("\x1b\x07\u202e\udcff")
+
+
+def test_a_sentence_is_the_same_with_and_without_rich(capsys):
+    stderr = Stderr()
+    stderr.print(HOSTILE)
+    alone = capsys.readouterr().err
+    assert "rich" not in vars(stderr)
+    stderr.rich.print(HOSTILE)
+    assert capsys.readouterr().err == alone == f"{SHOWN}\n"
 
 
 def test_what_can_be_seen_stays():
@@ -87,7 +96,7 @@ def slap(*arguments, **options):
 @pytest.mark.parametrize("target", ["/dev/full", "closed"])
 def test_a_stdout_that_takes_nothing_is_an_error_and_no_traceback(target):
     shell = f">{target}" if target != "closed" else ">&-"
-    command = f"{sys.executable} -m ensemble.cli domains --json {shell}"
+    command = f"{sys.executable} -m ensemble.cli domains obstacle2d --json {shell}"
     run = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=200)
     assert run.returncode == ErrorCode.INPUT_OUTPUT, run.stderr
     assert "Traceback" not in run.stderr

@@ -259,6 +259,7 @@ def test_the_block_is_taken_out_within_the_speed_limit(preset):
     assert (steps <= np.array(MAX_STEP) + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_the_papers_drawer_is_solved_the_same_way_twice():
     first, second = solve(PAPER.task(0), PAPER), solve(PAPER.task(1), PAPER)
     assert first.success

@@ -10,13 +10,14 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.room import within_reach
 from slap_ros.domains.benchtop.state_access import pose_of, yaw_of
-from slap_ros.domains.groceries.model import NAMES
+from slap_ros.domains.groceries.model import NAMES, REWARDS
 from slap_ros.domains.groceries.scenery import GROCERIES, INNER, OUTER, WALL_HEIGHT
 from slap_ros.domains.groceries.tasks import basket_station, grasp_goal, station
 from slap_ros.errors import InvalidParameterError, UnknownObjectError
 from slap_ros.relational import Column
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.panda import FINGER_OPEN
 from support.skill_starts import CONSTANT, achieves, skill_starts
 
@@ -121,6 +122,26 @@ def test_learners_observe_which_thing_it_is():
     sizes = ("rest_height", "half_width", "grasp_height")
     assert (features[:, -3:] == state.gather(things, sizes)[0] / 0.05).all()
     assert len(np.unique(features[:, -3:], axis=0)) == 6
+
+
+@pytest.mark.parametrize("number", range(10))
+def test_the_reward_of_pick_is_highest_where_the_thing_is_grasped(number):
+    """Not over its middle: a hand that is led there presses on a bottle and never closes."""
+    state = DOMAIN.task(0, goal=f"task{number}").initial_state
+    thing = state.layout.object(NAMES[number])
+    (robot,) = state.layout.of_type(ROBOT)
+    kind, pose = GROCERIES[NAMES[number]], pose_of(state, thing)
+    x, y, z = grasp_goal(kind, pose, yaw_of(state, thing)).position
+
+    def dense(dx, dz):
+        there = state.replace({(robot, "x"): x + dx, (robot, "y"): y, (robot, "z"): z + dz})
+        terms = REWARDS["Pick"].terms
+        one = [term.metric.normalised(there.alone(), Column((thing,)))[0, 0] for term in terms]
+        return sum(term.weight * value for term, value in zip(terms, one, strict=True))
+
+    highest = dense(0.0, 0.0)
+    assert highest == pytest.approx(0.6, abs=0.01)  # and the thing is not lifted yet
+    assert all(dense(*off) < highest for off in ((0.0, 0.01), (0.0, -0.01), (0.01, 0.0)))
 
 
 def test_opening_and_constant_motions_do_nothing_useful():

@@ -37,6 +37,7 @@ def random_walk(seed, steps=200):
     return states, actions
 
 
+@pytest.mark.slow
 def test_nothing_ever_interpenetrates_leaves_or_floats():
     touched = 0
     for seed in range(40):

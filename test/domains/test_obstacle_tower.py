@@ -31,6 +31,7 @@ from slap_ros.worlds.joint_space.features import GRASP_FEATURES
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 from slap_ros.worlds.panda import MAX_STEP, hand_pose
 from support.executed import executed, fluent_atoms
+from support.marks import slow
 from support.random_states import random_states
 
 FAIR, PAPER = get_domain("obstacle_tower"), get_domain("obstacle_tower", "paper")
@@ -140,6 +141,7 @@ def test_random_towers_are_taken_apart_within_the_speed_limit(seed):
     assert (steps <= np.array(MAX_STEP) + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_the_paper_tower_is_solved_the_same_way_twice():
     first, second = solve(PAPER.task(0), PAPER), solve(PAPER.task(1), PAPER)
     assert first.success
@@ -227,7 +229,7 @@ class WatchedModel(Model):
 
 
 @pytest.mark.parametrize("preset", ["fair", "paper"])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, *slow(1)])
 def test_the_lazy_search_is_bounded_truly_and_finds_the_cost_of_the_exhaustive(preset, seed):
     domain = {"fair": FAIR, "paper": PAPER}[preset]
     settings = RandomTowerTasks(obstacles=(1 + seed, 1 + seed), distractors=(1 - seed, 1 - seed))

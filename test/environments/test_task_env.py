@@ -185,6 +185,7 @@ def test_a_domain_without_a_learners_interface_says_so():
         ViewObservation(domain, ObjectSlots.of([space]), space, state)
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_page_run():
     page = (ROOT / "docs" / "learners.md").read_text(encoding="utf-8")
     first, learned, ours, masked = re.findall(r"```python\n(.*?)```", page, re.DOTALL)

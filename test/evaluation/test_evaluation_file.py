@@ -37,6 +37,7 @@ def file(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_the_figures_are_those_of_the_trials(file):
     data = json.loads(file.read_text())
     for row in data["approaches"]:

@@ -168,6 +168,8 @@ OURS = ("slap_ros", "ensemble", "embedded_ros/src", "launch", "benchmarks", *(
     f"{name}_node" for name in ("sim", "perception", "planner", "recorder")
 ), "skill_server", "robot_bridge")  # fmt: skip
 DESERIALISERS = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
+LOADERS = {"eval", "exec", "load", "load_all", "unsafe_load", "unsafe_load_all"}
+LOADERS |= {"full_load", "full_load_all"}
 # Codecs and constructors, generated from installed ``.msg`` files.
 GENERATED = {"embedded_ros/types/cdr.py", "embedded_ros/types/interfaces.py"}
 
@@ -191,6 +193,8 @@ def objection(node):
         names = {alias.name for alias in node.names} | {getattr(node, "module", None)}
         return next(iter(names & DESERIALISERS), None)
     if not isinstance(node, ast.Call):
+        return None
+    if getattr(node.func, "attr", getattr(node.func, "id", None)) not in LOADERS:
         return None
     called = ast.unparse(node.func)
     options = {option.arg: ast.unparse(option.value) for option in node.keywords}

@@ -236,6 +236,7 @@ print(*map(float.hex, trigonometry.sin_cos(0.3)))
 """
 
 
+@pytest.mark.slow
 def test_two_processes_that_compile_at_once_share_one_cache(tmp_path):
     both = [run(PART, XDG_CACHE_HOME=str(tmp_path)) for _ in range(2)]
     results = [result(process) for process in both]

@@ -140,6 +140,19 @@ def test_steps_are_those_of_all_stages(steps):
         OURS.with_total_steps(1)
 
 
+@pytest.mark.parametrize(
+    ("learner", "most"),
+    [
+        ({"ppo": replace(OURS.ppo, total_steps=60_000), "polish": None}, 60_416),  # 59 rollouts
+        ({"ppo": replace(OURS.ppo, total_steps=61_440), "polish": None}, 61_440),
+        ({"sac": ShortcutSacSettings(total_steps=1_001)}, 1_008),
+        ({"ppo": replace(OURS.ppo, total_steps=1), "polish": OURS.ppo, "attempts": 3}, 253_952),
+    ],
+)
+def test_a_stage_takes_whole_rollouts_and_the_first_may_be_tried_again(learner, most):
+    assert replace(OURS, **learner).most_steps == most
+
+
 def test_steps_that_contradict_themselves_are_refused():
     both = ["--steps", "10", "--set", "ppo.total_steps=10"]
     run = CliRunner().invoke(app, ["train", "obstacle2d", *both])

@@ -166,6 +166,7 @@ def test_domains_shows_what_skills_are_acquired_with(installed):
     assert data in listed
 
 
+@pytest.mark.slow
 def test_check_tries_the_demonstrator_and_the_goals():
     found = {one.name: one for one in check_domain(DOMAIN, 0, 3, 40)}
     assert found["demonstrator"].found.startswith("all 3 tasks, in ")

@@ -312,6 +312,7 @@ def test_an_output_that_is_no_page_is_refused(tmp_path: Path, name: str) -> None
         check_output(tmp_path / name)
 
 
+@pytest.mark.slow
 def test_a_tower_is_told_without_pybullet(bags: Bags, tmp_path: Path) -> None:
     """What PyBullet is needed for is the second opinion on perception, and the page says so."""
     output = tmp_path / "page.html"

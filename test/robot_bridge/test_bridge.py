@@ -142,6 +142,7 @@ def lab(robot=None, bridge=None, started=True, world="mock"):
         yield bench
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(700)
 def test_the_ensemble_solves_a_task_on_a_mock_robot(network, tmp_path):
     bag = tmp_path / "bag"

@@ -146,6 +146,7 @@ def test_nothing_moves_unless_somebody_says_so(bag):
     assert "nothing moved" in told
 
 
+@pytest.mark.slow
 def test_the_mock_robot_does_what_was_recorded(network, bag):
     code, out, told = slap_alone(bag, "--to", "mock", "--mock", QUICK, "--robot", PATIENT, "--json")
     assert code == 0, told

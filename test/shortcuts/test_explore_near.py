@@ -62,6 +62,7 @@ def pushed_aside(candidates):
     return [c for c in candidates if ("OnTable", (0,)) in c.signature.add]
 
 
+@pytest.mark.slow
 def test_no_operator_leads_where_a_push_does_so_the_graph_alone_finds_nothing(blocked, found):
     assert not explore(blocked, replace(NEAR, beyond=False))
     candidates = pushed_aside(found)

@@ -271,12 +271,14 @@ def test_a_shortcut_serves_a_goal_that_operators_reach_before_it_would_end():
     assert slap.plan.predicted_steps < 0.6 * pure.plan.predicted_steps
 
 
+@pytest.mark.slow
 def test_the_goal_of_training_needs_nothing_beyond_the_graph():
     pure, slap = results(TOWER.task(3), chosen_library(None, TOWER))
     assert slap.graph_nodes == pure.graph_nodes
     assert slap.plan.predicted_steps < 0.6 * pure.plan.predicted_steps
 
 
+@pytest.mark.slow
 def test_a_shortcut_leads_beyond_the_graph_whatever_another_does_within():
     """To stack the lowest block on the highest, one may let a single block fall, or slap all."""
     task = TOWER.task(3)

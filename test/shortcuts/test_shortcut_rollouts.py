@@ -101,6 +101,7 @@ def test_the_shortest_come_first_and_no_more_than_wanted(batch):
         assert len(steps) <= sampling.alternatives + 1
 
 
+@pytest.mark.slow
 def test_a_batch_finds_a_way_at_least_as_short():
     few, many = (replace(SAMPLING, batch=batch) for batch in (1, 64))
     sums = [

@@ -192,6 +192,7 @@ SMALL = replace(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_from_exploration_to_a_library_like_any_other(tmp_path):
     tasks = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)

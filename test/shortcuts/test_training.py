@@ -170,6 +170,28 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path):
     )
 
 
+class UntilRanked(Recorder):
+    """Ends when exploration is over."""
+
+    def on_ranked(self, ranked):
+        raise KeyboardInterrupt
+
+
+@pytest.mark.training
+def test_exploration_goes_on_after_the_last_task_that_was_explored(tmp_path):
+    once_each = []
+    for done, work in (("never", "whole"), (1, "work"), ("never", "work")):
+        with pytest.raises(KeyboardInterrupt):
+            train(tmp_path / work, BRIEF, UntilRanked(interrupt_at=("exploring tasks", done)))
+        once_each.append(sorted(path.name for path in (tmp_path / work).glob("*explored*")))
+    assert once_each == [["explored.json"], [".explored.jsonl"], ["explored.json"]]
+    whole, resumed = (
+        [without_time(task) for task in json.loads((tmp_path / work / "explored.json").read_text())]
+        for work in ("whole", "work")
+    )
+    assert json.dumps(whole) == json.dumps(resumed)
+
+
 KILLED = """
 import os
 from pathlib import Path

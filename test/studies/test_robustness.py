@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -32,6 +33,7 @@ def solved(preset, hides_top, max_replans):
     return solve_task(setup, hides_top, max_replans, 2, 0)
 
 
+@pytest.mark.slow
 def test_the_same_seed_has_the_same_trial():
     first, again = (without_time(solved("stochastic", False, 1)) for _ in range(2))
     assert first == again
@@ -66,6 +68,7 @@ def test_planning_for_what_is_seen_fails_where_the_tower_is_higher():
     assert solved("fair", False, 1).success
 
 
+@pytest.mark.slow
 def test_the_report_has_our_figures_beside_the_papers(tmp_path):
     arguments = ["study", "stochastic", "obstacle_tower", *QUICK, "0"]
     arguments += ["--library", str(LIBRARY), "--output", str(tmp_path)]

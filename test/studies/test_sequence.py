@@ -13,19 +13,21 @@ pytest.importorskip("matplotlib")
 GOALS = ("task0", "task1", "task2")
 
 
-def sequence(folder, steps, tried, scratch=False, **changes):
+def sequence(folder, steps, solved, scratch=False, **changes):
     """A library of groceries with the record of a sequence."""
     goals = [
         {
             "goal": goal,
-            "steps": count,
+            "steps": 2 * count,
             "steps_to_level": count,
-            "reached": True,
-            "learned": {"Pick": count},
+            "reached": count != 700,
+            "learned": {"Pick": 2 * count},
+            "retrieved": {},
             "ended": "nothing fails",
-            "tried": dict(zip(GOALS, progress, strict=False)),
+            "tried": dict.fromkeys(GOALS[: len(success)], 0.9),
+            "solved": dict(zip(GOALS, success, strict=False)),
         }
-        for goal, count, progress in zip(GOALS, steps, tried, strict=True)
+        for goal, count, success in zip(GOALS, steps, solved, strict=True)
     ]
     folder.mkdir()
     about = {
@@ -52,13 +54,16 @@ def test_later_goals_are_compared_with_the_first_and_forgetting_shows(tmp_path):
     assert ran.exit_code == 0, ran.output
     found = json.loads((tmp_path / "out" / "sequence_groceries.json").read_text())["found"]
     assert found["later_over_first"] == {"carried on": 0.2, "from scratch": 1.0}
+    assert found["kept_over_before"] == {"carried on": pytest.approx(5 / 7), "from scratch": 0.0}
     page = (tmp_path / "out" / "sequence_groceries.md").read_text()
     # after the third goal: (.75 + .25) / 2 and .75 of what was (1 + 1) / 2 and (1 + .5) / 2
     assert (
-        "| carried on | task2 | 2 | 500 ± 283 | 1.00 ± 0.00 | 0.62 ± 0.18 | 0.88 ± 0.18 |" in page
+        "| carried on | task2 | 2 | ≥ 500 ± 283 | 1000 ± 566 | 1.00 ± 0.00 | 0.62 ± 0.18 | "
+        "0.88 ± 0.18 |" in page
     )
     assert (
-        "| from scratch | task2 | 1 | 900 ± 0 | 1.00 ± 0.00 | 0.00 ± 0.00 | 1.00 ± 0.00 |" in page
+        "| from scratch | task2 | 1 | 900 ± 0 | 1800 ± 0 | 1.00 ± 0.00 | 0.00 ± 0.00 | "
+        "1.00 ± 0.00 |" in page
     )
 
 

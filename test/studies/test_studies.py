@@ -140,6 +140,7 @@ def test_a_variation_takes_the_place_of_the_setting_in_the_preset():
 # -- goals ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_shortcuts_help_with_other_goals_and_never_harm(tmp_path):
     data = study(tmp_path, "goals", "obstacle2d", "--goals", 10, "--seeds", 2, *PLANNING)
     goals = data["found"]["goals"]
@@ -242,6 +243,7 @@ def test_trainings_with_several_seeds_are_averaged(tmp_path, training):
     assert second["success_sd"] == pytest.approx(np.std([0.5, 0.9], ddof=1))
 
 
+@pytest.mark.slow
 def test_plans_are_made_with_what_was_learned_so_far(tmp_path, training):
     arguments = ["--work", training, "--tasks", 2, "--seeds", 1, *PLANNING]
     data = study(tmp_path, "dynamics", "obstacle2d", *arguments)

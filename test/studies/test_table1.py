@@ -49,6 +49,7 @@ def written(libraries, tmp_path_factory):
     return output
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_the_trials(written):
     found = rows(written)
     assert [(row["preset"], row["approach"]) for row in found] == [

@@ -7,16 +7,24 @@ from dataclasses import replace
 
 from rclpy.action import ActionClient
 from rclpy.node import Node
-from slap_msgs.action import AcquireSkills
+from slap_msgs.action import AcquireSkills, GrowSkills
 from slap_msgs.msg import AcquisitionEvent, SkillLibrary
 
-from ensemble.interfaces import ACQUIRE_SKILLS, ACQUISITION_EVENTS, RESET_TASK, SKILLS, SOLVE_TASK
+from ensemble.interfaces import (
+    ACQUIRE_SKILLS,
+    ACQUISITION_EVENTS,
+    GROW_SKILLS,
+    RESET_TASK,
+    SKILLS,
+    SOLVE_TASK,
+)
 from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s
+GROWTH_LIMIT = 400.0  # s, for two rounds, each of which starts processes that import torch
 # Both skills of `points` are learned with these in seconds.
 LEARNED = (
     "sac.net_arch=32,32 sac.batch_size=64 sac.learning_rate=0.002 sac.gamma=0.9 sac.tau=0.02 "
@@ -40,42 +48,63 @@ class Asker(Node):
     def __init__(self) -> None:
         super().__init__("asker")
         self.client = ActionClient(self, ACQUIRE_SKILLS.type, ACQUIRE_SKILLS.name)
+        self.grower = ActionClient(self, GROW_SKILLS.type, GROW_SKILLS.name)
         self.solver = ActionClient(self, SOLVE_TASK.type, SOLVE_TASK.name)
         self.reset = self.create_client(RESET_TASK.type, RESET_TASK.name)
         self.events: list[AcquisitionEvent] = []
         self.libraries: list[SkillLibrary] = []
-        self.feedback: list[AcquireSkills.Feedback] = []
+        self.feedback: list[AcquireSkills.Feedback | GrowSkills.Feedback] = []
         for topic, kept in ((ACQUISITION_EVENTS, self.events), (SKILLS, self.libraries)):
             self.create_subscription(topic.type, topic.name, kept.append, topic.qos)
 
 
 @contextmanager
-def asking(record=None, names=("sim_node", "acquisition_node"), **parameters):
+def asking(record=None, names=("sim_node", "acquisition_node"), settings=SETTINGS, **parameters):
     """The nodes that are named, the recorder where there is a bag, and whoever asks them.
 
     Yields:
         Who asks, what spins it, and the nodes' launcher.
     """
-    every = node_parameters(replace(SETTINGS, record=record, acquisition=parameters))
+    every = node_parameters(replace(settings, record=record, acquisition=parameters))
     every |= {"acquisition_node": parameters | {"libraries": parameters.get("output", "")}}
     nodes = {name: every[name] for name in (*names, *(("recorder_node",) if record else ()))}
     with ProcessLauncher(nodes) as launcher, temporary_node(Asker) as (asker, spinner):
-        assert spinner.spin_until(asker.client.server_is_ready, LIMIT)
+        for client in (asker.client, asker.grower):
+            assert spinner.spin_until(client.server_is_ready, LIMIT)
         yield asker, spinner, launcher
 
 
 def send(asker, spinner, **goal):
     """The handle of a goal that was accepted."""
-    request = AcquireSkills.Goal(**goal)
-    sent = asker.client.send_goal_async(request, lambda m: asker.feedback.append(m.feedback))
+    return accepted(asker, spinner, asker.client, AcquireSkills.Goal(**goal))
+
+
+def send_growth(asker, spinner, **goal):
+    """The handle of a goal to grow skills and shortcuts."""
+    return accepted(asker, spinner, asker.grower, GrowSkills.Goal(**goal))
+
+
+def accepted(asker, spinner, client, goal):
+    """The handle of a goal of some action."""
+    sent = client.send_goal_async(goal, lambda m: asker.feedback.append(m.feedback))
     assert spinner.spin_until(sent.done, LIMIT)
     return sent.result()
 
 
 def acquire(asker, spinner, **goal):
     """The result of a goal."""
-    result = send(asker, spinner, **goal).get_result_async()
-    assert spinner.spin_until(result.done, LIMIT)
+    return result_of(spinner, send(asker, spinner, **goal))
+
+
+def grow(asker, spinner, **goal):
+    """The result of a goal to grow skills and shortcuts."""
+    return result_of(spinner, send_growth(asker, spinner, **goal), GROWTH_LIMIT)
+
+
+def result_of(spinner, handle, limit=LIMIT):
+    """What comes of a goal that was accepted."""
+    result = handle.get_result_async()
+    assert spinner.spin_until(result.done, limit)
     return result.result().result
 
 

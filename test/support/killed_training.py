@@ -24,7 +24,7 @@ from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.skills.skill_library import save_skill_library
 from support.points import POINTS, REWARDS
 
-KILLS = 10
+KILLS = 5
 SHARE = 1 / 4  # of an undisturbed training's processor time: a process has half of it, on average
 SETTINGS = AcquisitionSettings(
     SacSettings(

@@ -12,7 +12,8 @@ An iteration of :meth:`Curriculum.run` is one of the algorithm:
   that does something for it: the nearest known ones are tried first;
 - a *dead end*, which is ours: what never succeeds is learned from scratch, and what comes before
   it (``dead_ends``);
-- *write back*: the best checkpoint is a skill at hand of the next iteration;
+- *write back*: the best checkpoint is a skill at hand of the next iteration; in the end, a known
+  skill that does as well as what was learned from it stays instead (``known_or_learned``);
 - *until nothing fails*, or progress is enough twice, or the budget is spent.
 
 Skills that do not fail are never trained. What is known between iterations is a
@@ -24,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -36,6 +38,7 @@ from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
 from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
 from slap_ros.acquisition.curriculum.jobs import LearningJob, horizon_of
+from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned, compare
 from slap_ros.acquisition.curriculum.library_record import library_record, skill_record
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.curriculum.skill_selection import (
@@ -46,11 +49,17 @@ from slap_ros.acquisition.curriculum.skill_selection import (
 from slap_ros.acquisition.curriculum.task_source import ROLLOUTS, VALIDATION, TaskSource
 from slap_ros.acquisition.training.retrieval import METRICS, MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.training.settings import AcquisitionSettings
-from slap_ros.acquisition.training.warm_start import ChosenStart, TriedStart, WarmStarts
+from slap_ros.acquisition.training.warm_start import (
+    ChosenStart,
+    TriedStart,
+    WarmStart,
+    WarmStarts,
+)
 from slap_ros.errors import UnsolvableError
+from slap_ros.learning.finished_jobs import FinishedJobs
 from slap_ros.learning.stored_keys import stored
 from slap_ros.learning.workers import Workers, run_in_order
-from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, load_skill
+from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, load_skill, save_skill
 
 TWICE = 2  # iterations in a row with enough progress that end a curriculum
 
@@ -89,6 +98,7 @@ class Curriculum:
         self._operators = {operator.name: operator for operator in self.source.operators()}
         self._kept_folders = {skill.operator.name: path for path, skill in self.kept.items()}
         self._kept = {name: self.kept[path] for name, path in self._kept_folders.items()}
+        self._begun: dict[str, WarmStart] = {}  # of each skill that began with a known one
         least = self.settings.least_similarity
         self._warm_starts = WarmStarts(self._kept, self.known, self.encoder, least)
 
@@ -120,14 +130,15 @@ class Curriculum:
             Why the curriculum is over; empty where it is not.
         """
         tasks = ROLLOUTS.batch(iteration, self.settings.rollouts)
-        rollouts = self._roll_out(iteration, "rollouts", tasks, state)
+        at_hand = self._at_hand(state)
+        rollouts = self._roll_out(iteration, "rollouts", tasks, at_hand)
         require_plans(rollouts, self.source)
         state.task_progress.append(fmean(rollout.progress for rollout in rollouts))
         self.callback.on_rollouts(iteration, rollouts)
         if over := self._why_over(rollouts, state):
             return over
         unseen = VALIDATION.batch(iteration, self.settings.validation)
-        fresh = self._roll_out(iteration, "fresh", unseen, state)
+        fresh = self._roll_out(iteration, "fresh", unseen, at_hand)
         selection = select_skills(rollouts, state, self.settings)
         state.not_trained = dict(selection.not_trained)
         if not selection.operators:
@@ -152,26 +163,35 @@ class Curriculum:
 
     # -- carrying out plans -----------------------------------------------------------------------
 
-    def _roll_out(
-        self, iteration: int, name: str, tasks: range, state: CurriculumState
-    ) -> list[PlanRollout]:
-        """Carry out plans with the skills at hand: those that were learned, or else are kept."""
+    def _at_hand(self, state: CurriculumState) -> dict[str, str]:
+        """The folders of the skills that were learned, or else are kept, by operator name."""
         learned = {name: str(self._skill(name, state)) for name in state.learned}
-        work = [(self.source, index, self._kept_folders | learned) for index in tasks]
-        return self._results.rollouts(iteration, name, lambda: self._carry_out(work))
+        return self._kept_folders | learned
 
-    def _carry_out(self, work: Sequence[tuple[TaskSource, int, dict[str, str]]]) -> list[Any]:
+    def _roll_out(
+        self, iteration: int, name: str, tasks: range, skills: dict[str, str]
+    ) -> list[PlanRollout]:
+        """Carry out plans with skills, by the folder of each."""
+        work = [(self.source, index, skills) for index in tasks]
+        return self._results.rollouts(iteration, name, partial(self._carry_out, work))
+
+    def _carry_out(
+        self, work: Sequence[tuple[TaskSource, int, dict[str, str]]], finished: FinishedJobs
+    ) -> list[Any]:
         """Carry out plans, and what a search tries after shortcuts, if there are any.
 
         Args:
             work: Arguments of :func:`~slap_ros.acquisition.curriculum.jobs.carry_out`, one tuple
                 for each task.
+            finished: Tasks that are done already.
         """
-        plans = self._run("carrying out plans", jobs.carry_out, work)
+        plans = self._run("carrying out plans", jobs.carry_out, work, finished)
         if self.shortcuts is None:
             return plans
         after = [(*one, self.shortcuts) for one in work]
-        tried = self._run("trying skills after shortcuts", jobs.try_after_shortcuts, after)
+        tried = self._run(
+            "trying skills after shortcuts", jobs.try_after_shortcuts, after, finished
+        )
         return [*plans, *(rollout for task in tried for rollout in task)]
 
     def _skill(self, name: str, state: CurriculumState) -> Path:
@@ -222,7 +242,7 @@ class Curriculum:
         if not work:
             return chosen
         found = self._results.known(
-            iteration, lambda: self._run("trying known skills", jobs.try_known, work)
+            iteration, partial(self._run, "trying known skills", jobs.try_known, work)
         )
         for (_, name, starts, _), successes in zip(work, found, strict=True):
             tried = tuple(map(TriedStart, starts, successes))
@@ -252,6 +272,8 @@ class Curriculum:
             skill = state.skills[name]
             number, attempt = skill.rounds, skill.attempt
             start = starts.get(name, ChosenStart())
+            if start.start is not None:
+                self._begun[name] = start.start
             states = InitiationStates.of(name, rollouts), InitiationStates.of(name, fresh)
             if attempt and not number:
                 states = states[0].for_another, states[1]
@@ -289,16 +311,56 @@ class Curriculum:
     def _library(self, ended: str, iteration: int, state: CurriculumState) -> SkillLibrary:
         """The library of the skills that were learned, and of those that were kept."""
         unseen = VALIDATION.batch(iteration, self.settings.validation)
-        fresh = self._roll_out(iteration, "final", unseen, state)
-        vacuity = self._vacuity(state.learned, fresh)
-        skills = [skill for name, skill in self._kept.items() if name not in state.learned]
-        for name in state.learned:
-            skill = load_skill(self._skill(name, state), self._domain)
-            record = skill_record(state.skills[name], vacuity[name], self.source.seed)
+        at_hand = self._at_hand(state)
+        fresh = self._roll_out(iteration, "final", unseen, at_hand)
+        compared = self._compare(fresh, state)
+        if known := [name for name, one in compared.items() if one.known_stays]:
+            at_hand |= {name: str(self._known_folder(name)) for name in known}
+            fresh = self._roll_out(iteration, "final_known", unseen, at_hand)
+        learned = [name for name in state.learned if name not in known or name not in self._kept]
+        vacuity = self._vacuity(learned, fresh)
+        skills = [skill for name, skill in self._kept.items() if name not in learned]
+        for name in learned:
+            skill = load_skill(Path(at_hand[name]), self._domain)
+            progress, both = state.skills[name], compared.get(name)
+            record = skill_record(progress, vacuity[name], self.source.seed, both)
             skills.append(replace(skill, record=record))
         ordered = sorted(skills, key=lambda skill: skill.folder_name)
         record = library_record(self.source, self._stored_settings, state, ended, fresh)
         return SkillLibrary(self.source.domain.name, tuple(ordered), record)
+
+    def _compare(
+        self, fresh: Sequence[PlanRollout], state: CurriculumState
+    ) -> dict[str, KnownOrLearned]:
+        """Try known skills and what was learned from them, by operator name.
+
+        Where a skill had to be learned from scratch after a dead end, what counts is not its own
+        success.
+
+        Args:
+            fresh: Plans on tasks that training never saw, with what was learned.
+            state: State of the curriculum in the end.
+        """
+        names = [n for n in state.learned if n in self._begun and not state.skills[n].attempt]
+        if not names:
+            return {}
+        starts = {name: InitiationStates.of(name, fresh).all for name in names}
+        work = [
+            (self.source, self._begun[name], self._skill(name, state), starts[name])
+            for name in names
+        ]
+        found = self._results.compared(lambda: self._run("trying known skills", compare, work))
+        return dict(zip(names, found, strict=True))
+
+    def _known_folder(self, name: str) -> Path:
+        """The folder of a known skill that stays; that of another library is written down."""
+        if name in self._kept_folders:
+            return Path(self._kept_folders[name])
+        operator, template = self._operators[name], self.source.rewards()[name]
+        policy, horizon = self._begun[name].policy, horizon_of(self._domain)
+        folder = self._results.known_skill(operator)
+        save_skill(folder, AcquiredSkill(operator, template, policy, horizon))
+        return folder
 
     def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
         """What policies that see nothing are worth in each skill's place; None where untried."""
@@ -306,7 +368,7 @@ class Curriculum:
         begun = [name for name in names if starts[name]]
         work = [(self.source, name, starts[name], self.settings.judged) for name in begun]
         found = self._results.vacuity(
-            lambda: self._run("trying constant actions", jobs.vacuity, work)
+            partial(self._run, "trying constant actions", jobs.vacuity, work)
         )
         return dict.fromkeys(names) | dict(zip(begun, found, strict=True))
 
@@ -338,9 +400,21 @@ class Curriculum:
         return data
 
     def _run(
-        self, what: str, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
+        self,
+        what: str,
+        function: Callable[..., Any],
+        work: Sequence[tuple[Any, ...]],
+        finished: FinishedJobs | None = None,
     ) -> list[Any]:
-        return run_in_order(self.workers, function, work, what, self.callback)
+        """The results of a step's jobs, in their order.
+
+        Args:
+            what: Name of the step, in words.
+            function: Function of a job.
+            work: Arguments of the function, one tuple for each job.
+            finished: Jobs that have ended already; None where each keeps what it has done itself.
+        """
+        return run_in_order(self.workers, function, work, what, self.callback, finished)
 
 
 def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:

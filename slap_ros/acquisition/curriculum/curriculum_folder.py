@@ -13,7 +13,10 @@
         rounds.json            how a round of training went, per skill
       Pick/                    the training of a skill; see skill_training
       Pick-1/                  the same from scratch, after a dead end
+      compared.json            known skills beside what was learned from them
+      known/                   those known skills of other libraries that did as well
       vacuity.json             what constant and random actions are worth
+      .vacuity.jsonl           jobs of a result that is under way, as they end
 """
 
 from __future__ import annotations
@@ -22,13 +25,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.training.skill_training import Round
+from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.relational import LiftedOperator
 from slap_ros.skills.skill_library import skill_folder_name
 
 Compute = Callable[[], list[Any]]  # computes a result as JSON, where the folder has none
+ComputeByJobs = Callable[[FinishedJobs], list[Any]]  # the same, after the jobs that have ended
 
 
 class CurriculumFolder:
@@ -49,7 +55,7 @@ class CurriculumFolder:
         """
         self._work.require_same(curriculum)
 
-    def rollouts(self, iteration: int, name: str, compute: Compute) -> list[PlanRollout]:
+    def rollouts(self, iteration: int, name: str, compute: ComputeByJobs) -> list[PlanRollout]:
         """The plans that were carried out in an iteration.
 
         Args:
@@ -60,13 +66,14 @@ class CurriculumFolder:
         Raises:
             InvalidParameterError: What is in the folder is damaged.
         """
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             f"iteration{iteration}/{name}",
             compute,
             lambda data: [PlanRollout.from_json(one) for one in data],
         )
 
-    def known(self, iteration: int, compute: Compute) -> list[list[float]]:
+    def known(self, iteration: int, compute: ComputeByJobs) -> list[list[float]]:
         """The success rates of known skills in place of each new one.
 
         Args:
@@ -76,7 +83,8 @@ class CurriculumFolder:
         Raises:
             InvalidParameterError: What is in the folder is damaged.
         """
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             f"iteration{iteration}/known",
             compute,
             lambda data: [[float(success) for success in one] for one in data],
@@ -94,13 +102,26 @@ class CurriculumFolder:
             lambda data: [Round.from_json(one) for one in data],
         )
 
-    def vacuity(self, compute: Compute) -> list[Any]:
+    def compared(self, compute: Compute) -> list[KnownOrLearned]:
+        """The known skills that others began with, beside what was learned from them.
+
+        Args:
+            compute: Function that tries both.
+
+        Raises:
+            InvalidParameterError: What is in the folder is damaged.
+        """
+        return self._work.cached(
+            "compared", compute, lambda data: [KnownOrLearned(**one) for one in data]
+        )
+
+    def vacuity(self, compute: ComputeByJobs) -> list[Any]:
         """The vacuity of each skill, how well blind policies do, as JSON, in order of the skills.
 
         Raises:
             InvalidParameterError: What is in the folder is damaged.
         """
-        return self._work.cached("vacuity", compute, list)
+        return cached_jobs(self._work, "vacuity", compute, list)
 
     def training(self, operator: str, attempt: int) -> Path:
         """The folder in which the skill of an operator is trained; see ``skill_training``.
@@ -110,6 +131,10 @@ class CurriculumFolder:
             attempt: Number of times that the skill was learned from scratch before.
         """
         return self._path / (f"{operator}-{attempt}" if attempt else operator)
+
+    def known_skill(self, operator: LiftedOperator) -> Path:
+        """The folder of a known skill that does as well as what was learned from it."""
+        return self._path / "known" / skill_folder_name(operator)
 
     def skill(self, operator: LiftedOperator, attempt: int) -> Path:
         """The folder of the best policy of a training, as in a library.

@@ -9,6 +9,7 @@ from statistics import fmean
 from typing import Any
 
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, SkillProgress
+from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.curriculum.skill_selection import NO_PROGRESS
 from slap_ros.acquisition.curriculum.task_source import TaskSource
@@ -16,7 +17,10 @@ from slap_ros.versions import processor, versions
 
 
 def skill_record(
-    progress: SkillProgress, vacuity: Mapping[str, Any] | None, seed: int
+    progress: SkillProgress,
+    vacuity: Mapping[str, Any] | None,
+    seed: int,
+    compared: KnownOrLearned | None = None,
 ) -> dict[str, Any]:
     """The record of a skill that was trained.
 
@@ -25,15 +29,20 @@ def skill_record(
         vacuity: Vacuity of the skill, how well blind policies do, as JSON; None where no fresh task
             has come to the skill.
         seed: Seed of the curriculum.
+        compared: Known skill that the training began with, beside what was learned from it; None
+            where it began with random weights.
     """
+    beginning = {} if compared is None else {"beside_its_beginning": compared.as_json()}
+    known = compared is not None and compared.known_stays
     return {
-        "success": progress.success,
+        "success": compared.known if compared is not None and known else progress.success,
         "vacuity": vacuity,
         "steps": progress.steps,
         "rounds": progress.rounds,
         "attempts": progress.attempt + 1,
         "seed": seed,
         "began_with": progress.began_with,
+        **beginning,
     }
 
 

@@ -11,10 +11,11 @@ from slap_ros.errors import InvalidParameterError
 
 @dataclass(frozen=True)
 class WarmStartSettings:
-    """How a new skill makes use of a known one; by default, of its weights alone.
+    """How a new skill makes use of a known one.
 
-    What protects a good skill from its first updates does so on a toy domain. In the one skill in
-    contact in which all of it together was tried, it was no better than without.
+    Critics that begin with random weights, and have seen random actions alone, destroy a good
+    policy. So by default the known skill acts until the first update, with little noise, and the
+    critics learn alone for a while before the policy does.
 
     Args:
         candidates: Number of known skills, the nearest ones, that are tried at most.
@@ -37,12 +38,12 @@ class WarmStartSettings:
     candidates: int = 3
     trials: int = 10
     least_success: float = 0.1
-    acting: float = 0.0
-    critic_updates: int = 0
+    acting: float = 1.0
+    critic_updates: int = 2000
     cloning: float = 0.0
     cloning_steps: int = 8000
-    noise: float = 1.0
-    entropy: float = 1.0
+    noise: float = 0.3
+    entropy: float = 0.1
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.acting <= 1.0 and min(self.noise, self.entropy) > 0.0):

@@ -3,8 +3,8 @@
 """Groceries: put one of six things into a basket, in the manner of LIBERO-Object (LG-SAIL §5).
 
 Ten things differ in shape, width, weight and where they are grasped; one operator picks them all.
-Read on in this order: ``model`` (types, predicates, operators, rewards), ``scenery``, ``tasks``,
-``demonstrator``.
+Read on in this order: ``model`` (types, a metric, predicates, operators, rewards), ``scenery``,
+``tasks``, ``demonstrator``.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ MODEL = BenchtopModel(
         scripts=demonstrator.SCRIPTS,
     ),
     scene_of=scene_of,
+    metrics=model.METRICS,
 )
 
 

@@ -7,12 +7,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, roll_out
-from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.command_options import DomainName, Jobs, Preset
 from slap_ros.api.left_out import Tell
 from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
@@ -24,7 +23,13 @@ from slap_ros.skills.domain_choice import DomainChoice, chosen_skills, open_doma
 from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.lg_sail.domain_choices import GoalNames, all_goals, shipped_skills
+from slap_ros.studies.lg_sail.domain_choices import (
+    GoalNames,
+    LibraryTasks,
+    SkillLibraries,
+    all_goals,
+    shipped_skills,
+)
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_each, plot_whole
@@ -336,15 +341,9 @@ class AcquisitionOptions:
     """Options of this study."""
 
     domain: DomainName
-    library: Annotated[
-        list[Path] | None,
-        CommandOption(
-            "Folder that `slap acquire` made. May be repeated. Default: all that ship.",
-            metavar="FOLDER",
-        ),
-    ] = None
+    library: SkillLibraries = None
     goal: GoalNames = None
-    tasks: Annotated[int, CommandOption("Number of tasks per goal and library.", least=1)] = 100
+    tasks: LibraryTasks = 100
     seed: FreshSeed = FRESH_SEED
     preset: Preset = None
     jobs: Jobs = 1

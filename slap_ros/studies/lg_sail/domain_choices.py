@@ -16,6 +16,24 @@ from slap_ros.policies.shipped_models import shipped_with_siblings
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.skills.skill_library import read_library_record
 
+SkillLibraries = Annotated[
+    list[Path] | None,
+    CommandOption(
+        "Folder that `slap acquire` made. May be repeated. Default: all that ship.",
+        metavar="FOLDER",
+        name="--library",
+    ),
+]
+HandWrittenLibraries = Annotated[
+    list[Path] | None,
+    CommandOption(
+        "Folder that `slap acquire` made. May be repeated. Default: all that ship with "
+        "hand-written operators and rewards.",
+        metavar="FOLDER",
+        name="--library",
+    ),
+]
+LibraryTasks = Annotated[int, CommandOption("Number of tasks per goal and library.", least=1)]
 GoalNames = Annotated[
     list[str] | None,
     CommandOption("Name of a goal. May be repeated. Default: all goals of the domain."),

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
@@ -27,6 +26,9 @@ from slap_ros.studies.lg_sail.acquisition import (
     of_library,
 )
 from slap_ros.studies.lg_sail.domain_choices import (
+    GoalNames,
+    HandWrittenLibraries,
+    LibraryTasks,
     all_goals,
     hand_written,
     shipped_skills,
@@ -309,29 +311,17 @@ class ImitationOptions:
     """Options of this study."""
 
     domain: DomainName
-    library: Annotated[
-        list[Path] | None,
-        CommandOption(
-            "Folder that `slap acquire` made, whose skills are imitated. May be repeated. Default: "
-            "all that ship with hand-written operators and rewards.",
-            metavar="FOLDER",
-        ),
-    ] = None
+    library: HandWrittenLibraries = None
     trajectories: Annotated[
         list[int] | None,
         CommandOption(
-            "Number of trajectories per skill. May be repeated. Default: 50, as in the paper.",
+            "Number of trajectories per skill, from plans for the first goal. May be repeated. "
+            "Default: 50, as in the paper.",
             least=1,
         ),
     ] = None
-    goal: Annotated[
-        list[str] | None,
-        CommandOption(
-            "Name of a goal. May be repeated. Trajectories are recorded in plans for the first "
-            "one. Default: all goals of the domain."
-        ),
-    ] = None
-    tasks: Annotated[int, CommandOption("Number of tasks per goal and library.", least=1)] = 50
+    goal: GoalNames = None
+    tasks: LibraryTasks = 50
     seed: FreshSeed = FRESH_SEED
     preset: Preset = None
     jobs: Jobs = 1

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
@@ -25,6 +24,7 @@ from slap_ros.studies.comparison import format_spread, named_tasks, not_solved, 
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,
+    HandWrittenLibraries,
     all_goals,
     hand_written,
     shipped_skills,
@@ -234,14 +234,7 @@ class ReplanningOptions:
     """Options of this study."""
 
     domain: DomainName
-    library: Annotated[
-        list[Path] | None,
-        CommandOption(
-            "Folder that `slap acquire` made. May be repeated. Default: all that ship with "
-            "hand-written operators and rewards.",
-            metavar="FOLDER",
-        ),
-    ] = None
+    library: HandWrittenLibraries = None
     goal: GoalNames = None
     tasks: Annotated[int, CommandOption("Number of tasks per seed and goal.", least=1)] = 20
     seeds: Annotated[int, CommandOption("Number of seeds for the first library.", least=1)] = 5

@@ -30,12 +30,17 @@ if TYPE_CHECKING:
 MEASURED = """\
 Skills are acquired for one goal after another. A library is carried on: skills that carry out the
 next goal are used as they are, and learned further where they fail. Beside it are sequences in
-which each goal is learned from scratch, where such were run. Steps are those of learning for a
-goal, all skills together, the mean ± sample standard deviation over sequences; they go on until
-nothing fails, or the budget is spent, so that a goal costs steps also after .8 was reached. Task
-progress is measured after each goal, in tasks that training never sees: of the goal itself, and the
-mean over all goals before it, with what it was right after each was learned. The paper counts steps
-until three judgements in a row have 80 % of success."""
+which each goal is learned from scratch, where such were run. *Steps to .8* are those after which
+three judgements in a row, of which it is the first, had .8 of the goal's tasks solved, as the paper
+counts them; at the end of a goal, where nothing is learned any more, fewer suffice. A judgement is
+made after every segment of a skill's training (2,000 steps by default): the product of the success
+of the plan's skills, from states that plans come to. Between rounds of training, and at the end,
+whole plans are carried out instead. *All steps* go on until nothing fails, or the budget is spent.
+Steps are of all skills together, the mean ± sample standard deviation over sequences; a cell has a
+≥ where a sequence never came to .8 at a goal, and its whole length counts. *Solved* is the share of
+tasks, which training never sees, whose stages were all done right after the goal was learned. For
+all goals before, it is given as it is now, and as it was right after each of these was learned.
+Judgements and trials are not counted as steps."""
 SEQUENCES = "runs/sequences"
 CARRIED, SCRATCH = "carried on", "from scratch"
 
@@ -46,15 +51,19 @@ class GoalOfSequence:
 
     Args:
         goal: Name of the goal, or its atoms.
+        level_steps: Environment steps of each sequence until enough of its tasks were solved.
+        reached: Number of sequences that came there.
         steps: Environment steps that each sequence learned for it.
-        progress: Task progress on it right after it was learned, of each sequence.
-        kept: Mean task progress on all goals before it, of each sequence; empty for the first.
+        solved: Share of its tasks that were solved right after it was learned, of each sequence.
+        kept: Mean of that over all goals before it, of each sequence; empty for the first.
         before: Mean of what that was right after each of these goals was learned.
     """
 
     goal: str
+    level_steps: tuple[int, ...]
+    reached: int
     steps: tuple[int, ...]
-    progress: tuple[float, ...]
+    solved: tuple[float, ...]
     kept: tuple[float, ...]
     before: tuple[float, ...]
 
@@ -66,24 +75,41 @@ def goals_of(sequences: Sequence[Sequence[SequenceStep]]) -> list[GoalOfSequence
         own = [sequence[number] for sequence in sequences]
         earlier = [[one.goal for one in sequence[:number]] for sequence in sequences]
         kept = [
-            fmean(s.tried[g] for g in goals) for s, goals in zip(own, earlier, strict=True) if goals
+            fmean(s.solved[g] for g in goals)
+            for s, goals in zip(own, earlier, strict=True)
+            if goals
         ]
         before = [
-            fmean(one.tried[one.goal] for one in sequence[:number])
+            fmean(one.solved[one.goal] for one in sequence[:number])
             for sequence in sequences
             if number
         ]
-        progress = tuple(one.tried[one.goal] for one in own)
-        steps = tuple(one.steps for one in own)
-        found.append(GoalOfSequence(first.goal, steps, progress, tuple(kept), tuple(before)))
+        found.append(
+            GoalOfSequence(
+                first.goal,
+                tuple(one.steps_to_level for one in own),
+                sum(one.reached for one in own),
+                tuple(one.steps for one in own),
+                tuple(one.solved[one.goal] for one in own),
+                tuple(kept),
+                tuple(before),
+            )
+        )
     return found
 
 
 def later_share(goals: Sequence[GoalOfSequence]) -> float | None:
-    """Mean environment steps of all goals after the first, over those of the first."""
-    if len(goals) < 2 or not sum(goals[0].steps):
+    """Mean steps to .8 of all goals after the first, over those of the first."""
+    if len(goals) < 2 or not sum(goals[0].level_steps):
         return None
-    return fmean(fmean(goal.steps) for goal in goals[1:]) / fmean(goals[0].steps)
+    later = fmean(fmean(goal.level_steps) for goal in goals[1:])
+    return later / fmean(goals[0].level_steps)
+
+
+def kept_share(goals: Sequence[GoalOfSequence]) -> float | None:
+    """Mean success on all goals before the last, over what it was as each was learned."""
+    before = fmean(goals[-1].before) if goals and goals[-1].before else 0.0
+    return fmean(goals[-1].kept) / before if before else None
 
 
 def study(domain: str, kinds: Mapping[str, Sequence[Sequence[SequenceStep]]]) -> StudyReport:
@@ -97,7 +123,6 @@ def study(domain: str, kinds: Mapping[str, Sequence[Sequence[SequenceStep]]]) ->
         The report.
     """
     goals = {kind: goals_of(sequences) for kind, sequences in kinds.items()}
-    shares = {kind: later_share(of_kind) for kind, of_kind in goals.items()}
     return StudyReport(
         study="sequence",
         source="LG-SAIL Fig. 5",
@@ -108,15 +133,17 @@ def study(domain: str, kinds: Mapping[str, Sequence[Sequence[SequenceStep]]]) ->
                 "library",
                 "goal",
                 "sequences",
-                "steps",
-                "task progress",
-                "on goals before",
+                "steps to .8",
+                "all steps",
+                "solved",
+                "of goals before",
                 "as these were learned",
             ),
             [_row(kind, goal) for kind, of_kind in goals.items() for goal in of_kind],
         ),
         found={
-            "later_over_first": shares,
+            "later_over_first": {kind: later_share(of_kind) for kind, of_kind in goals.items()},
+            "kept_over_before": {kind: kept_share(of_kind) for kind, of_kind in goals.items()},
             "sequences": {
                 kind: [[step.as_json() for step in steps] for steps in sequences]
                 for kind, sequences in kinds.items()
@@ -132,35 +159,41 @@ def _row(kind: str, goal: GoalOfSequence) -> list[str]:
         kind,
         goal.goal,
         str(len(goal.steps)),
-        format_spread(Spread.of([float(steps) for steps in goal.steps]), 0),
-        format_spread(Spread.of(goal.progress), 2),
+        ("" if goal.reached == len(goal.steps) else "≥ ") + _spread(goal.level_steps),
+        _spread(goal.steps),
+        format_spread(Spread.of(goal.solved), 2),
         format_spread(Spread.of(goal.kept), 2) if goal.kept else "-",
         format_spread(Spread.of(goal.before), 2) if goal.before else "-",
     ]
 
 
+def _spread(steps: Sequence[int]) -> str:
+    return format_spread(Spread.of([float(count) for count in steps]), 0)
+
+
 def draw(figure: Figure, kinds: Mapping[str, Sequence[GoalOfSequence]]) -> None:
-    """Draw the steps of each goal, every sequence a dot, and their means as a line."""
+    """Draw the steps to .8 of each goal, every sequence a dot, and their means as a line."""
     axes = figure.subplots()
     for colour, (kind, goals) in zip(LINES, kinds.items(), strict=False):
         places = range(1, len(goals) + 1)
-        means = [fmean(goal.steps) for goal in goals]
+        means = [fmean(goal.level_steps) for goal in goals]
         axes.plot(places, means, color=colour, linewidth=1.2, label=kind)
         for place, goal in zip(places, goals, strict=True):
-            axes.plot([place] * len(goal.steps), goal.steps, ".", color=colour)
+            axes.plot([place] * len(goal.steps), goal.level_steps, ".", color=colour)
     axes.set_xlabel("goal, in the order of the sequence")
-    axes.set_ylabel("environment steps")
+    axes.set_ylabel("environment steps to .8 of success")
     axes.legend(loc="upper right")
 
 
 def _summary(found: Data) -> str:
-    shares = found["later_over_first"]
+    shares, kept = found["later_over_first"], found["kept_over_before"]
     said = [
         f"{kind}: {share:.2f} of the first goal's steps for each later one"
+        + (f", {kept[kind]:.2f} of the success kept" if kind == CARRIED and kept[kind] else "")
         for kind, share in shares.items()
         if share is not None
     ]
-    return ", ".join(said) or "nothing was learned for the first goal"
+    return "; ".join(said) or "nothing was learned for the first goal"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,7 +265,7 @@ def read_sequence(folder: Path, domain: str) -> tuple[str, tuple[SequenceStep, .
         sequence: Any = about["sequence"]
         steps = tuple(map(SequenceStep.from_json, sequence["goals"]))
         for number, step in enumerate(steps):
-            if any(goal.goal not in step.tried for goal in steps[: number + 1]):
+            if any(goal.goal not in step.solved for goal in steps[: number + 1]):
                 raise ValueError(f"after {step.goal}, not all goals were tried")
         if not steps:
             raise ValueError("it has no goals")

@@ -317,9 +317,6 @@ STUDY = Study(
             "SLAP Table 5, D.3, D.4",
             "predicates and perception that err",
             SLAP_DOMAINS,
-            {
-                "cluttered_drawer": "thresholds in [w/2, w]: 54 → 92%, in [w, 2w]: 63 → 0%",
-            },
         ),
     ),
 )
