@@ -21,7 +21,7 @@ FLOORS = (
     ("cli", "domain_check", "doctor"),
     ("studies",),
     ("api",),
-    ("report",),
+    ("report", "calibration"),
     ("baselines", "imitation"),
     ("environments", "robot", "bags", "evaluation", "encoding"),
     ("acquisition", "shortcuts"),

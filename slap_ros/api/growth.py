@@ -182,7 +182,7 @@ class GrowthRequest:
         Args:
             left: Environment steps that are left.
         """
-        given = self.training.budget
+        given, left = self.training.budget, max(left, 1)  # 0 would be no limit
         others = [text for text in self.shortcut_changes if not text.startswith("budget=")]
         return [*others, f"budget={min(left, given) if given else left}"]
 

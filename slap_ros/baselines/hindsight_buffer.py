@@ -20,7 +20,10 @@ from numpy.typing import NDArray
 from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.type_aliases import DictReplayBufferSamples
 
-PARTS = ("actions", "rewards", "dones", "timeouts", "ep_start", "ep_length")
+from slap_ros.baselines import stored_transitions
+from slap_ros.baselines.stored_transitions import restore_transitions, transitions_of
+
+PARTS = (*stored_transitions.PARTS, "ep_start", "ep_length")
 
 
 class HindsightBuffer(HerReplayBuffer):
@@ -46,12 +49,7 @@ class HindsightBuffer(HerReplayBuffer):
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All transitions, as arrays; those of an episode that is under way are never sampled."""
-        used = self.buffer_size if self.full else self.pos
-        found = {name: getattr(self, name)[:used] for name in PARTS}
-        for name in self.observations:
-            found[f"observations.{name}"] = self.observations[name][:used]
-            found[f"next.{name}"] = self.next_observations[name][:used]
-        return found
+        return transitions_of(self, PARTS)
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take back what :meth:`arrays` gave.
@@ -59,11 +57,5 @@ class HindsightBuffer(HerReplayBuffer):
         Raises:
             KeyError, ValueError: The arrays are of another buffer.
         """
-        used = len(arrays["rewards"])
-        for name in PARTS:
-            getattr(self, name)[:used] = arrays[name]
-        for name in self.observations:
-            self.observations[name][:used] = arrays[f"observations.{name}"]
-            self.next_observations[name][:used] = arrays[f"next.{name}"]
-        self.full, self.pos = used == self.buffer_size, used % self.buffer_size
+        restore_transitions(self, arrays, PARTS)
         self._current_ep_start[:] = self.pos

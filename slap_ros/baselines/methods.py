@@ -32,6 +32,7 @@ class MethodEntry:
 
 METHODS: Mapping[str, MethodEntry] = {
     "ppo": MethodEntry("ppo", "PPO of the whole task, by joint displacements alone."),
+    "sac": MethodEntry("sac", "SAC of the whole task, rewarded for the stages of its plan."),
     "sac-her": MethodEntry("sac_her", "SAC with hindsight experience replay of the whole task."),
     "hierarchical": MethodEntry(
         "hierarchical", "PPO over joint displacements and an activation for each ground skill."

@@ -68,6 +68,11 @@ COMMANDS = (
         "Write a scene file with AprilTags on every object, and a PDF of these tags to print.",
     ),
     CommandEntry(
+        "calibrate",
+        "slap_ros.cli.calibrate:calibrate",
+        "Identify friction from recorded pushes, so that the planner's model pushes alike.",
+    ),
+    CommandEntry(
         "domains",
         "slap_ros.cli.domains:domains",
         "List the installed domains, or the predicates, metrics, goals and operators of one.",
@@ -86,7 +91,7 @@ COMMANDS = (
     CommandEntry(
         "baseline",
         "slap_ros.cli.baseline:app",
-        "Train the learners that SLAP is compared with: PPO, SAC with hindsight, and more.",
+        "Train learners of whole tasks for comparison: PPO, SAC, SAC with hindsight, and more.",
     ),
     CommandEntry(
         "study",

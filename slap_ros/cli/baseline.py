@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``slap baseline``: train the learners that SLAP is compared with, and list them."""
+"""``slap baseline``: train learners of whole tasks for comparison, and list them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from slap_ros.skills.domain_choice import SHIPPED
 BASELINES = Path("runs/baselines")
 
 app = typer.Typer(
-    help="Train the learners that SLAP is compared with: PPO, SAC with hindsight, and more.",
+    help="Train learners of whole tasks for comparison: PPO, SAC, SAC with hindsight, and more.",
     no_args_is_help=True,
 )
 
@@ -64,7 +64,7 @@ class BaselineOptions:
     goal: Goal = None
     seed: TrainingSeed = 0
     settings: Annotated[
-        str, typer.Option(help="Hyper-parameters: ours, or paper (those of SLAP's appendix).")
+        str, typer.Option(help="Hyper-parameters: ours, or paper (SLAP's appendix; not for sac).")
     ] = "ours"
     set: Annotated[list[str] | None, setting_changes("n_envs=16")] = None
     steps: Annotated[
@@ -84,7 +84,7 @@ class BaselineOptions:
 @exits
 @flat_options
 def train(options: BaselineOptions) -> int:
-    """Train a learner of whole tasks, from their reward of -1 per step.
+    """Train a learner of whole tasks, from -1 per step; `sac` from the stages of a plan.
 
     After an interruption, the same command goes on where it stopped. `slap evaluate DOMAIN
     --against FOLDER` puts it beside planning.

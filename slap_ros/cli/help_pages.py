@@ -79,6 +79,7 @@ EXAMPLES: Mapping[str, str] = {  # those of studies are in their files
     "skills": "slap skills models/skills/stow_hammer",
     "check": "slap check obstacle2d",
     "scene": "slap scene obstacle_tower --seed 1 --tags runs/tags",
+    "calibrate": "slap calibrate runs/pushes --output runs/calibrated.yaml",
     "domains": "slap domains stow_hammer",
     "list": "slap list",
     "doctor": "slap doctor",

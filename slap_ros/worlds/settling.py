@@ -9,8 +9,8 @@ import math
 from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
 
 LEANING = 0.15  # rad; what is tilted by more does not lie on a face
-DISTANCE_ERROR = 0.08  # m, by which a tag in a picture may seem further away than it is
 FLOATING = 0.015  # m, between a bottom and the top of what it is taken to lie on
+DISTANCE_ERROR = 0.08  # m, by which a tag in a picture may seem further away than it is
 AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 

@@ -20,7 +20,7 @@ from support.scripted_server import serving
 pytestmark = pytest.mark.usefixtures("points_installed")
 SMALL = [
     "rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.net_arch=8,8",
-    "sac.learning_starts=96",
+    "sac.learning_starts=96", "warm_start.critic_updates=10",
 ]  # fmt: skip
 SHORTCUTS = str(Path(__file__).parents[2] / "models" / "shortcuts" / "obstacle2d")
 BUDGET = [*(word for change in SMALL for word in ("--set", change)), "--steps", 200, "--jobs", 1]

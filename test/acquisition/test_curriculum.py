@@ -171,7 +171,7 @@ def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
 def test_a_skill_that_never_succeeds_is_learned_from_scratch_and_so_is_what_comes_before(tmp_path):
     """What is put down is to be still in the hand: no policy does that."""
     impossible = replace(PUT, delete_effects=frozenset())
-    impatient = replace(WHOLE, patience=1, skill_steps=1_600)
+    impatient = replace(WHOLE, patience=1, skill_steps=1_200, rollouts=6, validation=6)
     made = ((PICK, impossible), REWARDS)
     library, events = acquire(tmp_path, impatient, made=made)
     assert events.dead_ends == [DeadEnd(skill="Put", before="Pick")] * (MOST_ATTEMPTS - 1)

@@ -197,7 +197,10 @@ def study(*arguments):
 @pytest.mark.training
 def test_the_study_counts_the_steps_of_both_and_is_read_again(tmp_path):
     library = write_library(tmp_path / "known", PICKING)
-    settings = ("sac.net_arch=4", "sac.learning_starts=192", "segment_episodes=4", "rollouts=3")
+    settings = (
+        "sac.net_arch=4", "sac.learning_starts=192", "segment_episodes=4", "rollouts=3",
+        "warm_start.critic_updates=10",
+    )  # fmt: skip
     arguments = [
         *("--from", library, "--seeds", 1, "--steps", 400, "--output", tmp_path / "out"),
         *(word for one in (*settings, "validation=3") for word in ("--set", one)),

@@ -15,13 +15,14 @@ from ensemble.cli.application import app
 from slap_ros.api.baselines import train_baseline
 from slap_ros.baselines.hindsight_buffer import HindsightBuffer
 from slap_ros.baselines.option_rollouts import OptionRolloutBuffer
-from slap_ros.baselines.sac_her import REPLAY
+from slap_ros.baselines.sac import REPLAY
 from slap_ros.baselines.trained_baseline import load_baseline
 from slap_ros.baselines.training_envs import joined_envs, separate_envs
 from slap_ros.baselines.trials import try_baseline
 from slap_ros.domains import get_domain
 from slap_ros.environments.registration import make_task_env
 from slap_ros.errors import ErrorCode, InvalidLibraryError, InvalidParameterError
+from support.marks import slow
 
 SHORT = {"n_envs": 2, "n_steps": 32, "batch_size": 32, "n_epochs": 1, "validation": 1}
 
@@ -134,10 +135,10 @@ def test_what_follows_a_long_action_is_discounted_by_its_steps():
 # -- training -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["ppo", "hierarchical", "sac-her", "sol"])
+@pytest.mark.parametrize("method", ["ppo", "hierarchical", "sac", "sac-her", "sol"])
 def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     changes = {"n_envs": 2, "batch_size": 8, "validation": 1}
-    changes |= {"learning_starts": 102} if method == "sac-her" else {"n_steps": 16}
+    changes |= {"learning_starts": 102} if "sac" in method else {"n_steps": 16}
 
     def stop(progress):
         if progress.steps >= 120 and not (tmp_path / "stopped").exists():
@@ -152,11 +153,25 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     assert 120 <= before < 200 <= record["environment_steps"] < 300
     with pytest.raises(InvalidParameterError, match="other settings"):
         train_baseline(method, domain, tmp_path / "x", **given, seed=1)
-    if method == "sac-her":
+    if "sac" in method:
         assert np.load(tmp_path / "x-training" / REPLAY)["rewards"].size >= 100
     (tmp_path / "x-training" / "checkpoint.pt").write_bytes(b"PK damaged")
     with pytest.raises(InvalidParameterError, match=r"checkpoint\.pt: damaged"):
         train_baseline(method, domain, tmp_path / "x", **given)
+
+
+@pytest.mark.parametrize("name", ["stack_at_target", *slow("peg_in_hole", "stow_hammer")])
+def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, name):
+    """LG-SAIL's flat baseline: one policy, which observes all objects and the goal."""
+    changes = {"n_envs": 1, "learning_starts": 16, "batch_size": 8, "validation": 1}
+    domain = get_domain(name)
+    trained = train_baseline(
+        "sac", domain, tmp_path / "x", goal="training", steps=40, changes=changes
+    )
+    assert trained.environment == {"obs": "dict", "control": "joints", "reward": "stages"}
+    assert trained.record["environment_steps"] == 40
+    assert trained.actions == 5
+    assert load_baseline(tmp_path / "x", domain).goal == "training"
 
 
 def test_the_same_seed_learns_the_same_weights(tmp_path, domain, trained):
@@ -238,7 +253,7 @@ def test_more_objects_than_a_policy_has_room_for_count_as_failed(trained, domain
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("dreamer", "obstacle2d"), 2, "there are ppo, sac-her, hierarchical, sol"),
+        (("dreamer", "obstacle2d"), 2, "there are ppo, sac, sac-her, hierarchical, sol"),
         (("ppo", "moon"), ErrorCode.UNKNOWN_DOMAIN, "moon"),
         (("ppo", "obstacle2d", "--settings", "best"), 15, "there are ours, paper"),
         (("ppo", "obstacle2d", "--set", "tau=1"), 15, "unknown setting 'tau'; there are n_envs"),
@@ -255,4 +270,4 @@ def test_what_there_is_not_is_refused(tmp_path, arguments, code, words):
 def test_methods_are_listed():
     code, said, _ = slap("baseline", "list", "--json")
     assert code == 0
-    assert list(json.loads(said)) == ["ppo", "sac-her", "hierarchical", "sol"]
+    assert list(json.loads(said)) == ["ppo", "sac", "sac-her", "hierarchical", "sol"]

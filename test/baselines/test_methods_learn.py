@@ -37,6 +37,14 @@ def test_ppo_takes_a_block(tmp_path):
     assert success("ppo", EASY, HOLDING, 12_000, changes, tmp_path) >= 0.5
 
 
+@pytest.mark.slow  # 1,000 updates of actor and critics
+@pytest.mark.training
+@pytest.mark.timeout(300)
+def test_sac_takes_a_block_by_the_stages_of_its_plan(tmp_path):
+    changes = {**QUICK_SAC, "learning_starts": 400}
+    assert success("sac", EASY, HOLDING, 2_000, changes, tmp_path) >= 0.5
+
+
 @pytest.mark.slow  # 1,100 updates of actor and critics
 @pytest.mark.training
 @pytest.mark.timeout(300)
