@@ -150,7 +150,7 @@ class GraphPlanner:
         """
         start = self.problem.model.space.abstract(state)
         for extra_depth in range(self.max_extra_depth + 1):
-            graph = self.graph(start, goal, extra_depth, self.max_nodes)
+            graph = self.graph(start, goal, extra_depth)
             self.add_shortcuts(graph)
             outcome = self.search(graph, state, self.problem.model)
             if outcome.plan is not None:
@@ -158,7 +158,7 @@ class GraphPlanner:
         return graph, outcome
 
     def graph(
-        self, start: int, goal: int, extra_depth: int = 0, max_nodes: int = MAX_NODES
+        self, start: int, goal: int, extra_depth: int = 0, max_nodes: int | None = None
     ) -> AbstractGraph:
         """The top level, still without shortcuts.
 
@@ -166,15 +166,16 @@ class GraphPlanner:
             start: Abstract state to start from, a mask.
             goal: Mask of atoms that must hold.
             extra_depth: Layers after the first with a goal state.
-            max_nodes: Abstract states after which to give up.
+            max_nodes: Abstract states after which to give up; None for the planner's own.
 
         Raises:
             UnsolvableError: No operators lead to the goal; which atoms of it cannot be had.
             PlanningLimitError: More than ``max_nodes`` abstract states.
         """
         operators = self.problem.operators
+        most = self.max_nodes if max_nodes is None else max_nodes
         try:
-            graph = build_abstract_graph(start, goal, operators, extra_depth, max_nodes)
+            graph = build_abstract_graph(start, goal, operators, extra_depth, most)
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
         graph.space = self.problem.model.space

@@ -215,6 +215,11 @@ def test_without_numba_plans_are_the_same():
     assert same == digest
 
 
+def test_where_numba_is_told_to_compile_nothing_numpy_computes():
+    program = "from slap_ros.motion.backend import backend; print(type(backend()).__name__)"
+    assert result(run(program, NUMBA_DISABLE_JIT="1"))[0] == ["NumpyBackend"]
+
+
 @pytest.mark.slow
 def test_where_no_cache_can_be_written_code_is_compiled_again():
     program = """

@@ -36,6 +36,9 @@ COMPLETE = "complete"  # a file that is written once everything is compiled
 _config: Any = numba.config
 logger = logging.getLogger(__name__)
 
+if _config.DISABLE_JIT:  # these functions as plain Python are slower than numpy
+    raise ImportError("numba compiles nothing: NUMBA_DISABLE_JIT is set")
+
 
 def inner(function: Function) -> Function:
     """A function that other compiled ones call; it becomes a part of them."""
