@@ -95,7 +95,7 @@ class EpisodeTracker(Generic[T]):
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="episode")
         self._skills = common.skills
         self._libraries = AnnouncedLibraries(common.libraries)
-        self._names = frozenset(domain_names())  # to look there takes 0.1 s
+        self._names = frozenset(domain_names())
         self._announced = DomainAnnouncements()
         self._unusable: set[DomainChoice] = set()  # those that were tried in vain
         self._domains: OrderedDict[DomainChoice, OpenedDomain] = OrderedDict()  # as announced
