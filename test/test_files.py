@@ -151,10 +151,12 @@ def test_a_file_may_be_as_large_as_its_reader_says(tmp_path):
         read_bytes(tmp_path / "a", 2)
 
 
-# Files of the package itself, of the kernel, of git; and files that are written.
+# Files of the package itself, of installed distributions, of the kernel, of git; and files that are
+# written.
 OWN = {
     "doctor/machine.py",
     "domains/cleanup_table/shapes/__init__.py",
+    "domains/registry.py",
     "files.py",
     "messages/typestore.py",
     "motion/kernels/compilation.py",
