@@ -4,9 +4,10 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
-# pip would compile every test of every library, too, and on one processor.
+# pip would compile all of every library, on one processor: tests, and what is hardly used, too.
 PIP_INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
-COMPILE_LIBRARIES := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true  # some have files of other Pythons
+NOT_COMPILED := /tests?/|/(pip|pkg_resources|pybullet_envs|pybullet_examples|pygments|setuptools)/
+COMPILE_LIBRARIES := $(BIN)/python -m compileall -qq -j 0 -x '$(NOT_COMPILED)' $(VENV)/lib || true  # some have files of other Pythons
 # No test should wait until motion planning is compiled. Half a second where it is.
 COMPILE_MOTION := $(BIN)/python -m slap_ros.motion.kernels
 TESTS_AT_ONCE := 4  # on two cores: many wait for nodes, networks and clocks

@@ -119,10 +119,10 @@ class AnytimePlanner:
             PlanningLimitError: No plan was found within the limits.
         """
         abstract = self.problem.model.space.abstract(state)
-        planner = self._whole
+        planner = replace(self._whole, max_nodes=self._most_abstract_states)
         run = _Improvement(self, state, goal)
         try:
-            graph = planner.graph(abstract, goal, max_nodes=self._most_abstract_states)
+            graph = planner.graph(abstract, goal)
         except PlanningLimitError:
             self.problem.require_reachable(abstract, goal)
             yield from run.near_plans(abstract)

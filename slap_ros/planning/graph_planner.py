@@ -157,25 +157,21 @@ class GraphPlanner:
                 break
         return graph, outcome
 
-    def graph(
-        self, start: int, goal: int, extra_depth: int = 0, max_nodes: int | None = None
-    ) -> AbstractGraph:
+    def graph(self, start: int, goal: int, extra_depth: int = 0) -> AbstractGraph:
         """The top level, still without shortcuts.
 
         Args:
             start: Abstract state to start from, a mask.
             goal: Mask of atoms that must hold.
             extra_depth: Layers after the first with a goal state.
-            max_nodes: Abstract states after which to give up; None for the planner's own.
 
         Raises:
             UnsolvableError: No operators lead to the goal; which atoms of it cannot be had.
             PlanningLimitError: More than ``max_nodes`` abstract states.
         """
         operators = self.problem.operators
-        most = self.max_nodes if max_nodes is None else max_nodes
         try:
-            graph = build_abstract_graph(start, goal, operators, extra_depth, most)
+            graph = build_abstract_graph(start, goal, operators, extra_depth, self.max_nodes)
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
         graph.space = self.problem.model.space

@@ -20,6 +20,7 @@ from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.files import pretty_json
 from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.sampling import Sampling
@@ -91,7 +92,8 @@ def test_generalisation_has_the_numbers_of_the_experiments(tmp_path):
 
 
 def test_a_task_without_a_plan_counts_as_failed_and_is_told_of(tmp_path, monkeypatch):
-    monkeypatch.setattr("slap_ros.planning.graph_planner.GraphPlanner.graph.__defaults__", (0, 9))
+    *others, _max_nodes = GraphPlanner.__init__.__defaults__
+    monkeypatch.setattr(GraphPlanner.__init__, "__defaults__", (*others, 9))
     arguments = ["generalisation", "obstacle2d", "--tasks", 1, "--seeds", 3, *PLANNING]
     arguments += ["--vary", "bystanders=0,1", "--output", tmp_path]
     result = CliRunner().invoke(app, ["study", *map(str, arguments)])

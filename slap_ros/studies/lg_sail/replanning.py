@@ -16,11 +16,9 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import Experiment, Trial, task_job, try_task
-from slap_ros.evaluation.statistics import SuccessRate
-from slap_ros.evaluation.summary import Spread
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.skills.domain_choice import DomainChoice, chosen_skills
-from slap_ros.studies.comparison import format_spread, named_tasks, not_solved, spread_of
+from slap_ros.studies.comparison import format_spread, named_tasks, not_solved
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,
@@ -30,6 +28,7 @@ from slap_ros.studies.lg_sail.domain_choices import (
     shipped_skills,
 )
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
+from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_each, plot_interval, plot_whole
 from slap_ros.studies.study import PreparedStudy, Study
@@ -116,19 +115,9 @@ class ReplanningRow:
         return f"seed{plural} {', '.join(str(library.seed) for library in self.libraries)}"
 
     @property
-    def solved(self) -> SuccessRate:
-        """Share of the tasks whose goal was reached."""
-        return SuccessRate(sum(trial.success for trial in self.trials), len(self.trials))
-
-    @property
-    def replans(self) -> Spread:
-        """Spread of the replans over all tasks."""
-        return Spread.of([float(trial.replans) for trial in self.trials])
-
-    @property
-    def steps(self) -> Spread | None:
-        """Spread of the environment steps of solved tasks; None without any."""
-        return spread_of([float(trial.plan_length) for trial in self.trials if trial.success])
+    def figures(self) -> ReplannedTrials:
+        """Success, length and replans of the trials of all libraries."""
+        return ReplannedTrials(self.trials)
 
     @property
     def failures(self) -> Counter[str]:
@@ -138,29 +127,30 @@ class ReplanningRow:
 
     def as_json(self) -> dict[str, Any]:
         """The summary, and that of each library."""
+        figures = self.figures
         return {
             "goal": self.goal,
             "tasks": len(self.trials),
-            "success_rate": self.solved.share,
-            "success_interval": asdict(self.solved.interval),
-            "replans": asdict(self.replans),
+            "success_rate": figures.solved.share,
+            "success_interval": asdict(figures.solved.interval),
+            "replans": asdict(figures.replans),
             "replanned": sum(trial.replans > 0 for trial in self.trials),
-            "steps": asdict(self.steps) if self.steps else None,
+            "steps": asdict(figures.length) if figures.length else None,
             "failures": dict(self.failures),
             "libraries": [library.as_json() for library in self.libraries],
         }
 
     def as_row(self) -> list[str]:
         """Row of a table."""
-        tasks = len(self.libraries[0].trials)
+        tasks, figures = len(self.libraries[0].trials), self.figures
         failures = [f"`{name}` {count}" for name, count in self.failures.most_common()]
         return [
             self.goal or "(the task's own)",
             self.seeds,
             f"{len(self.libraries)} × {tasks}",
-            str(self.solved),
-            format_spread(self.replans, 2),
-            format_spread(self.steps, 0),
+            str(figures.solved),
+            format_spread(figures.replans, 2),
+            format_spread(figures.length, 0),
             ", ".join(failures) or "none",
         ]
 
@@ -221,9 +211,9 @@ def draw(figure: Figure, goals: Sequence[ReplanningRow]) -> None:
     """Draw success with its interval, and that of each library."""
     axes = figure.subplots()
     for place, goal in enumerate(goals):
-        plot_interval(axes, place, goal.solved.interval)
+        plot_interval(axes, place, goal.figures.solved.interval)
         plot_each(axes, place, [100 * library.rate for library in goal.libraries])
-        plot_whole(axes, place, 100 * goal.solved.share)
+        plot_whole(axes, place, 100 * goal.figures.solved.share)
     name_rows(axes, [f"{one.goal or 'own goal'}: {one.seeds}" for one in goals])
     axes.set_xlim(-3, 103)
     axes.set_xlabel("success [%]: each library, all of a row (dot) with 95 % interval")

@@ -7,7 +7,6 @@ Nothing is trained again, and the planner's model stays as it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from slap_ros.api.left_out import Tell
@@ -93,12 +92,7 @@ def _summary(found: Data) -> str:
     return words(found[SEEN])
 
 
-@dataclass(frozen=True, kw_only=True)
-class CameraOptions(ComparisonOptions):
-    """Options of this study."""
-
-
-def prepare(options: CameraOptions, tell: Tell) -> PreparedStudy:
+def prepare(options: ComparisonOptions, tell: Tell) -> PreparedStudy:
     """Open domain and library.
 
     Raises:
@@ -113,7 +107,7 @@ STUDY = Study(
     "camera",
     help="Plans executed by what a camera sees of tags on blocks: a robot in MuJoCo, closed loop.",
     example="slap study camera obstacle_tower",
-    options=CameraOptions,
+    options=ComparisonOptions,
     prepare=prepare,
     summary=_summary,
     costs="planning, simulation and tags",

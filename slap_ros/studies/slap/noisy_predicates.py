@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,18 +16,16 @@ from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.statistics import Interval, wilson_interval
-from slap_ros.evaluation.summary import Spread
 from slap_ros.skills.domain_choice import open_domain
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,
     format_spread,
     named_tasks,
-    spread_of,
 )
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
+from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.variations import Variation
 from slap_ros.studies.slap.varying_thresholds import VaryingExecutor
@@ -119,35 +118,21 @@ class ThresholdRow:
     trials: tuple[ThresholdTrial, ...]  # by seed and index
 
     @property
-    def success_rate(self) -> float:
-        """Share of the tasks that were solved."""
-        return fmean(one.success for one in self.trials)
-
-    @property
-    def interval(self) -> Interval:
-        """95 % interval of the success rate."""
-        return wilson_interval(sum(one.success for one in self.trials), len(self.trials))
-
-    @property
-    def length(self) -> Spread | None:
-        """The number of environment steps, over solved tasks."""
-        return spread_of([float(one.plan_length) for one in self.trials if one.success])
-
-    @property
-    def replans(self) -> Spread:
-        """The number of replans, over all tasks."""
-        return Spread.of([float(one.replans) for one in self.trials])
+    def figures(self) -> ReplannedTrials:
+        """Success, length and replans of the trials."""
+        return ReplannedTrials(self.trials)
 
     def as_json(self) -> dict[str, Any]:
         """The range, the summary and every trial, for the report's JSON."""
+        figures = self.figures
         return {
             "low": self.within.low,
             "high": self.within.high,
             "approach": self.approach,
-            "success_rate": self.success_rate,
-            "success_interval": asdict(self.interval),
-            "plan_length": asdict(self.length) if self.length else None,
-            "replans": asdict(self.replans),
+            "success_rate": figures.solved.share,
+            "success_interval": asdict(figures.solved.interval),
+            "plan_length": asdict(figures.length) if figures.length else None,
+            "replans": asdict(figures.replans),
             "papers_success_rate": self.within.papers.get(self.approach),
             "attempts": [asdict(one) for one in self.trials],
         }
@@ -155,13 +140,13 @@ class ThresholdRow:
     def as_cells(self) -> list[str]:
         """Row of the page's table."""
         papers = self.within.papers.get(self.approach)
-        low, high = self.interval.low, self.interval.high
+        figures = self.figures
         return [
             str(self.within),
             label(self.approach),
-            f"{self.success_rate:.0%} [{low:.0%}, {high:.0%}]",
-            format_spread(self.length, 1),
-            format_spread(self.replans, 1),
+            str(figures.solved),
+            format_spread(figures.length, 1),
+            format_spread(figures.replans, 1),
             f"{fmean(one.waits for one in self.trials):.1f}",
             "-" if papers is None else f"{papers:.0%}",
         ]
@@ -184,12 +169,16 @@ class DrawnThresholds:
     def draw(self) -> Domain:
         """The domain with every threshold multiplied by the next factor."""
         factor = self.random.uniform(self.within.low, self.within.high)
-        choice, nominal = self.setup.choice, self.setup.make_domain().configuration
-        preset = choice.preset
-        for setting in THRESHOLDS[choice.name]:
-            value = factor * float(nominal[setting])
-            preset = Variation(setting, ()).preset(preset, repr(float(value)))
-        return open_domain(replace(choice, preset=preset))
+        preset = self.setup.choice.preset
+        for setting, nominal in self._nominal.items():
+            preset = Variation(setting, ()).preset(preset, repr(factor * nominal))
+        return open_domain(replace(self.setup.choice, preset=preset))
+
+    @cached_property
+    def _nominal(self) -> dict[str, float]:
+        """Nominal value of every threshold, by the name of its setting."""
+        nominal = self.setup.make_domain().configuration
+        return {name: float(nominal[name]) for name in THRESHOLDS[self.setup.choice.name]}
 
 
 def study(comparison: Comparison, max_replans: int) -> StudyReport:
@@ -276,13 +265,13 @@ def draw(figure: Figure, rows: Sequence[ThresholdRow]) -> None:
     for number, name in enumerate(names):
         own = [one for one in rows if one.approach == name]
         beside = dodged(range(len(own)), number, len(names))
-        plot_values(success, beside, [100.0 * one.success_rate for one in own], name)
+        plot_values(success, beside, [100.0 * one.figures.solved.share for one in own], name)
         for place, one in zip(beside, own, strict=True):
             if name in one.within.papers:
                 papers = 100.0 * one.within.papers[name]
                 success.plot([place], [papers], "D", color="none", markeredgecolor="black")
-        plot_spreads(length, beside, [one.length for one in own], name)
-        plot_spreads(replans, beside, [one.replans for one in own], name)
+        plot_spreads(length, beside, [one.figures.length for one in own], name)
+        plot_spreads(replans, beside, [one.figures.replans for one in own], name)
     success.set_ylim(-8, 108)
     success.set_ylabel("success [%];\ndiamonds: the paper's")
     length.set_ylabel("length of solved\ntasks [steps]")

@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
-from slap_ros.evaluation.summary import Spread
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.partial import PartialPlanner
@@ -27,10 +25,10 @@ from slap_ros.studies.comparison import (
     PlanningSetup,
     format_spread,
     named_tasks,
-    spread_of,
 )
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
+from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study
 
@@ -108,42 +106,34 @@ class NoiseLevel:
     trials: tuple[NoisyTrial, ...]  # by seed and index
 
     @property
-    def success_rate(self) -> float:
-        """Part of the tasks solved in the world."""
-        return fmean(one.success for one in self.trials)
-
-    @property
-    def length(self) -> Spread | None:
-        """The number of environment steps, over solved tasks."""
-        return spread_of([float(one.plan_length) for one in self.trials if one.success])
-
-    @property
-    def replans(self) -> Spread:
-        """The number of replans, over all tasks."""
-        return Spread.of([float(one.replans) for one in self.trials])
+    def figures(self) -> ReplannedTrials:
+        """Success, length and replans of the trials."""
+        return ReplannedTrials(self.trials)
 
     def as_json(self) -> dict[str, Any]:
         """The noise, the summary and every trial, for the report's JSON."""
+        figures = self.figures
         return {
             "kind": self.kind,
             "value": self.value,
             "quality": {**asdict(self.quality), "hidden": sorted(self.quality.hidden)},
             "approach": self.approach,
-            "success_rate": self.success_rate,
-            "plan_length": asdict(self.length) if self.length else None,
-            "replans": asdict(self.replans),
+            "success_rate": figures.solved.share,
+            "plan_length": asdict(figures.length) if figures.length else None,
+            "replans": asdict(figures.replans),
             "attempts": [asdict(one) for one in self.trials],
         }
 
     def as_row(self) -> list[str]:
         """Row of a table."""
+        figures = self.figures
         where = self.kind if self.kind == EXACT else f"{self.kind}: {self.value}"
         return [
             " ".join(where.split()),
             label(self.approach),
-            f"{self.success_rate:.0%}",
-            format_spread(self.length, 1),
-            format_spread(self.replans, 1),
+            f"{figures.solved.share:.0%}",
+            format_spread(figures.length, 1),
+            format_spread(figures.replans, 1),
         ]
 
 
@@ -276,9 +266,9 @@ def _plot(column: Sequence[Axes], levels: Sequence[NoiseLevel], values: Sequence
     for number, name in enumerate(names):
         own = [one for one in levels if one.approach == name]
         beside = dodged(places, number, len(names))
-        plot_values(column[0], beside, [100.0 * one.success_rate for one in own], name)
-        plot_spreads(column[1], beside, [one.length for one in own], name)
-        plot_spreads(column[2], beside, [one.replans for one in own], name)
+        plot_values(column[0], beside, [100.0 * one.figures.solved.share for one in own], name)
+        plot_spreads(column[1], beside, [one.figures.length for one in own], name)
+        plot_spreads(column[2], beside, [one.figures.replans for one in own], name)
 
 
 def _summary(found: Data) -> str:
