@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every test that opens a network gets a DDS domain of its own; what it starts ends with it."""
 
+import gc
 import itertools
 import os
 import signal
@@ -51,6 +52,16 @@ def pytest_collection_modifyitems(items):
         for mark, fixtures in MARKED_BY.items():
             if fixtures & set(getattr(item, "fixturenames", ())):
                 item.add_marker(mark)
+
+
+def pytest_collection(session):
+    gc.disable()  # tests stay as long as the process does
+
+
+def pytest_collection_finish(session):
+    """Garbage is looked for among what tests make, and no longer in 5,000 tests and all modules."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)
