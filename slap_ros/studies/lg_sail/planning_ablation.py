@@ -20,7 +20,7 @@ from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.statistics import wilson_interval
+from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
@@ -304,8 +304,7 @@ def _share(counts: tuple[int, int], paper: float) -> str:
     good, every = counts
     if not every:
         return f"- ({paper:.0%})"
-    within = wilson_interval(good, every)
-    return f"{good / every:.0%} [{within.low:.0%}, {within.high:.0%}] ({paper:.0%})"
+    return f"{SuccessRate(good, every)} ({paper:.0%})"
 
 
 def draw(figure: Figure, tallies: Mapping[tuple[str, str], PlanTrials]) -> None:
@@ -318,7 +317,8 @@ def draw(figure: Figure, tallies: Mapping[tuple[str, str], PlanTrials]) -> None:
             axes.hlines(paper, place - 0.11, place + 0.11, color="0.3")
             good, every = getattr(tally, name)
             if every:
-                share, within = good / every, wilson_interval(good, every)
+                rate = SuccessRate(good, every)
+                share, within = rate.share, rate.interval
                 apart = [[max(share - within.low, 0.0)], [max(within.high - share, 0.0)]]
                 axes.bar(place, share, 0.23, color=LINES[number], yerr=apart, capsize=3)
         axes.bar(0, 0, color=LINES[number], label=name)

@@ -18,7 +18,7 @@ from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.statistics import wilson_interval
+from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.relational import LiftedOperator
 from slap_ros.studies.figures import LINES
@@ -169,8 +169,7 @@ def _table(measured: Sequence[RewardTrials], names: Sequence[str]) -> MarkdownTa
     rows = []
     for one in measured:
         count = len(one.attempts)
-        within = wilson_interval(one.all_right, count)
-        share = f"{one.all_right / count:.0%} [{within.low:.0%}, {within.high:.0%}]"
+        share = SuccessRate(one.all_right, count)
         rows.append(
             [
                 one.metrics,

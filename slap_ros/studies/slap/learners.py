@@ -138,12 +138,11 @@ COLUMNS = (
 
 def _cells(row: Row, cost: Data) -> list[str]:
     """A row of the page's table."""
-    rate, within = row.success
     count = len(row.results)
     return [
         label(row.approach),
         f"{row.tasks} × {count}" if cost else f"{row.tasks}",
-        f"{rate:.0%} [{within.low:.0%}, {within.high:.0%}]",
+        str(row.solved),
         format_spread(row.length, 1),
         relative_cell(row),
         f"{sum(cost['kept']) / count:.1f}" if cost else "-",

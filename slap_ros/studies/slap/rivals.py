@@ -142,12 +142,12 @@ COLUMNS = (
 
 def _cells(one: BaselineRow) -> list[str]:
     """A row of the page's table."""
-    row, (rate, within) = one.row, one.row.success
+    row = one.row
     return [
         f"`{row.preset}`",
         f"{row.tasks} × {len(one.trained)}" if one.trained else f"{row.tasks}",
         label(row.approach),
-        f"{rate:.0%} [{within.low:.0%}, {within.high:.0%}]",
+        str(row.solved),
         format_spread(row.length, 1),
         relative_cell(row),
         _mean(one.trained, "environment_steps", 1.0, ",.0f"),
@@ -167,9 +167,8 @@ def _draw(figure: Figure, rows: Sequence[BaselineRow]) -> None:
     axes = figure.subplots()
     name_rows(axes, [f"{label(one.row.approach)}, {one.row.preset}" for one in rows])
     for place, one in enumerate(rows):
-        rate, within = one.row.success
-        plot_interval(axes, place, within, LINES[0])
-        plot_whole(axes, place, 100 * rate)
+        plot_interval(axes, place, one.row.solved.interval, LINES[0])
+        plot_whole(axes, place, 100 * one.row.solved.share)
     axes.set_xlim(-2, 102)
     axes.set_xlabel("tasks solved, %")
 

@@ -34,6 +34,7 @@ from slap_ros.studies.comparison import PlanningSetup, format_spread, named_task
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.job_runner import Job, JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
+from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval
 from slap_ros.studies.slap.table1 import (
@@ -150,7 +151,7 @@ class RobustnessRow:
     @property
     def replans(self) -> Spread:
         """The number of replans, over all tasks."""
-        return Spread.of([float(trial.replans) for trial in self.figures.trials])
+        return ReplannedTrials(self.figures.trials).replans
 
     def as_json(self) -> dict[str, Any]:
         """Every figure and every trial, for the report's JSON."""
@@ -159,13 +160,12 @@ class RobustnessRow:
     def as_cells(self) -> list[str]:
         """Row of the page's table."""
         row = self.figures
-        rate, interval = row.success
         libraries = row.length_over_libraries
         count = "" if row.approach == PURE_PLANNING.name else f" × {len(row.results)}"
         return [
             label(row.approach),
             f"{row.tasks}{count}",
-            f"{rate:.0%} [{interval.low:.0%}, {interval.high:.0%}]",
+            str(row.solved),
             str(row.at_step_limit),
             format_spread(row.length, 1),
             "-" if libraries is None else f"{libraries.sd:.1f}",
@@ -377,9 +377,8 @@ def draw(figure: Figure, rows: Sequence[RobustnessRow], papers: Sequence[PapersR
     theirs = {one.approach: one for one in papers}
     for place, row in enumerate(one.figures for one in rows):
         style = APPROACH_STYLES[row.approach]
-        rate, interval = row.success
-        plot_interval(success, place, interval, style.colour)
-        success.plot([100 * rate], [place], style.marker, color=style.colour)
+        plot_interval(success, place, row.solved.interval, style.colour)
+        success.plot([100 * row.solved.share], [place], style.marker, color=style.colour)
         if row.approach in theirs:
             rate = theirs[row.approach].success_rate
             success.plot([100 * rate], [place], "D", color="none", markeredgecolor="black")

@@ -22,7 +22,7 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain, preset_names
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial
-from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
+from slap_ros.evaluation.statistics import Interval, SuccessRate, ratio_interval
 from slap_ros.evaluation.summary import Spread, lengths_of_both
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shipped import shipped_libraries
@@ -34,11 +34,11 @@ from slap_ros.studies.comparison import (
     named_tasks,
     not_solved,
     solve_task,
-    spread_of,
 )
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.job_runner import Job, JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
+from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
@@ -124,10 +124,9 @@ class Row:
         return [trial for result in self.results for trial in result.trials]
 
     @property
-    def success(self) -> tuple[float, Interval]:
-        """The rate and its interval."""
-        solved = sum(trial.success for trial in self.trials)
-        return solved / len(self.trials), wilson_interval(solved, len(self.trials))
+    def solved(self) -> SuccessRate:
+        """Share of the tasks that were solved."""
+        return ReplannedTrials(self.trials).solved
 
     @property
     def at_step_limit(self) -> int:
@@ -137,7 +136,7 @@ class Row:
     @property
     def length(self) -> Spread | None:
         """Plan length over solved tasks; None where none was solved."""
-        return spread_of([float(t.plan_length) for t in self.trials if t.success])
+        return ReplannedTrials(self.trials).length
 
     @property
     def length_over_libraries(self) -> Spread | None:
@@ -171,14 +170,13 @@ class Row:
 
     def as_json(self) -> dict[str, Any]:
         """Every figure and every trial, for the report's JSON."""
-        rate, interval = self.success
         relative = self.relative
         return {
             "preset": self.preset,
             "approach": self.approach,
             "tasks": self.tasks,
-            "success_rate": rate,
-            "success_interval": asdict(interval),
+            "success_rate": self.solved.share,
+            "success_interval": asdict(self.solved.interval),
             "at_step_limit": self.at_step_limit,
             "plan_length": asdict(self.length) if self.length else None,
             "plan_length_over_libraries": (
@@ -311,14 +309,13 @@ COLUMNS = (
 
 def cells(row: Row) -> list[str]:
     """A row of the page's table."""
-    rate, interval = row.success
     libraries = row.length_over_libraries
     count = len(row.results)
     return [
         f"`{row.preset}`",
         f"{row.tasks}" if row.approach == "pure_planning" else f"{row.tasks} × {count}",
         label(row.approach),
-        f"{rate:.0%} [{interval.low:.0%}, {interval.high:.0%}]",
+        str(row.solved),
         str(row.at_step_limit),
         format_spread(row.length, 1),
         "-" if libraries is None else f"{libraries.sd:.1f}",
