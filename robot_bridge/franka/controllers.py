@@ -13,12 +13,13 @@ from collections import Counter
 from collections.abc import Callable
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action import GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
 from ensemble.futures import wait_until
-from ensemble.robot_parameters import FrankaDriverParameters, action_name, arm_joints
+from ensemble.robot_parameters import FrankaDriverParameters, arm_joints
+from robot_bridge.action_servers import arm_server, gripper_server
 from robot_bridge.franka.objects import ModelledObjects
 from robot_bridge.goals import is_finite, points_of, trajectory_points
 from slap_ros.errors import InvalidCommandError, SlapError
@@ -46,14 +47,7 @@ class FrankaArmController:
         self._joints = arm_joints(settings.arm)
         self.busy = False  # whether a goal is under way
         self.moved_s = 0.0  # by motions to their end, on the robot's clock
-        self._server = ActionServer(
-            node,
-            FollowJointTrajectory,
-            action_name(settings.trajectory_action, settings.arm),
-            self._move,
-            goal_callback=self._on_goal,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+        self._server = arm_server(node, settings, self._move, self._on_goal)
 
     def destroy(self) -> None:
         """Destroy the action server."""
@@ -131,14 +125,7 @@ class FrankaGripperController:
         """
         self._node, self._arm, self._objects = node, arm, objects
         self._scale, self._counts = settings.gripper_scale, counts
-        self._server = ActionServer(
-            node,
-            GripperCommand,
-            action_name(settings.gripper_action, settings.arm),
-            self._grip,
-            goal_callback=self._on_goal,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+        self._server = gripper_server(node, settings, self._grip, self._on_goal)
 
     def destroy(self) -> None:
         """Destroy the action server."""

@@ -8,11 +8,12 @@ import math
 from collections import Counter
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action import GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
-from ensemble.robot_parameters import MockRobotParameters, action_name, arm_joints
+from ensemble.robot_parameters import MockRobotParameters, arm_joints
+from robot_bridge.action_servers import arm_server, gripper_server
 from robot_bridge.goals import is_finite, trajectory_points
 from robot_bridge.mock.plant import Plant
 from robot_bridge.simulated.noise_model import NoiseModel
@@ -52,22 +53,8 @@ class MockControllers:
         self._node, self._plant, self._noise = node, plant, noise
         self._settings, self._period_s, self._counts = settings, period_s, counts
         self._joints = arm_joints(settings.arm)
-        self._arm = ActionServer(
-            node,
-            FollowJointTrajectory,
-            action_name(settings.trajectory_action, settings.arm),
-            self._move,
-            goal_callback=self._on_motion,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
-        self._gripper = ActionServer(
-            node,
-            GripperCommand,
-            action_name(settings.gripper_action, settings.arm),
-            self._grip,
-            goal_callback=self._on_grip,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+        self._arm = arm_server(node, settings, self._move, self._on_motion)
+        self._gripper = gripper_server(node, settings, self._grip, self._on_grip)
 
     def destroy(self) -> None:
         """Destroy the action servers."""

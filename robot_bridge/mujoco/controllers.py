@@ -13,11 +13,12 @@ from collections.abc import Sequence
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand
 from control_msgs.msg import JointTolerance
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action import GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
-from ensemble.robot_parameters import MujocoRobotParameters, action_name, arm_joints
+from ensemble.robot_parameters import MujocoRobotParameters, arm_joints
+from robot_bridge.action_servers import arm_server, gripper_server
 from robot_bridge.goals import GoalUnderWay, is_finite, points_of, trajectory_points
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.waiting import pause
@@ -64,14 +65,7 @@ class MujocoArmController:
         self._joints = arm_joints(settings.arm)
         self._tracker = TrajectoryTracker(plant.joints)
         self._goal = GoalUnderWay()
-        self._server = ActionServer(
-            node,
-            FollowJointTrajectory,
-            action_name(settings.trajectory_action, settings.arm),
-            self._move,
-            goal_callback=self._on_goal,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+        self._server = arm_server(node, settings, self._move, self._on_goal)
 
     def destroy(self) -> None:
         """Destroy the action server."""
@@ -189,14 +183,7 @@ class MujocoGripperController:
         self._scale, self._counts = settings.gripper_scale, counts
         self._tracker = FingerTracker()
         self._goal = GoalUnderWay()
-        self._server = ActionServer(
-            node,
-            GripperCommand,
-            action_name(settings.gripper_action, settings.arm),
-            self._grip,
-            goal_callback=self._on_goal,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+        self._server = gripper_server(node, settings, self._grip, self._on_goal)
 
     def destroy(self) -> None:
         """Destroy the action server."""

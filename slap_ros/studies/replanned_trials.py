@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
 
 from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.evaluation.summary import Spread
@@ -56,3 +56,12 @@ class ReplannedTrials:
     def replans(self) -> Spread:
         """The number of replans, over all tasks."""
         return Spread.of([float(one.replans) for one in self.trials])
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures, for a report's JSON."""
+        return {
+            "success_rate": self.solved.share,
+            "success_interval": asdict(self.solved.interval),
+            "plan_length": asdict(self.length) if self.length else None,
+            "replans": asdict(self.replans),
+        }

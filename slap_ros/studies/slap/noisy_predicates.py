@@ -124,15 +124,11 @@ class ThresholdRow:
 
     def as_json(self) -> dict[str, Any]:
         """The range, the summary and every trial, for the report's JSON."""
-        figures = self.figures
         return {
             "low": self.within.low,
             "high": self.within.high,
             "approach": self.approach,
-            "success_rate": figures.solved.share,
-            "success_interval": asdict(figures.solved.interval),
-            "plan_length": asdict(figures.length) if figures.length else None,
-            "replans": asdict(figures.replans),
+            **self.figures.as_json(),
             "papers_success_rate": self.within.papers.get(self.approach),
             "attempts": [asdict(one) for one in self.trials],
         }

@@ -112,15 +112,12 @@ class NoiseLevel:
 
     def as_json(self) -> dict[str, Any]:
         """The noise, the summary and every trial, for the report's JSON."""
-        figures = self.figures
         return {
             "kind": self.kind,
             "value": self.value,
             "quality": {**asdict(self.quality), "hidden": sorted(self.quality.hidden)},
             "approach": self.approach,
-            "success_rate": figures.solved.share,
-            "plan_length": asdict(figures.length) if figures.length else None,
-            "replans": asdict(figures.replans),
+            **self.figures.as_json(),
             "attempts": [asdict(one) for one in self.trials],
         }
 
