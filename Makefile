@@ -60,7 +60,8 @@ demo: install  ## Run the whole ensemble with and without a shortcut, record, re
 	echo "more: \`slap evaluate obstacle2d\`: 50 tasks, success and plan length with intervals"; \
 	echo "more: \`slap evaluate obstacle2d --preset paper\`: from the paper's start states"
 
-PYTEST := $(abspath $(BIN))/pytest -q --dist worksteal
+# A product of matrices on two threads would wait for the processor that another test has.
+PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(abspath $(BIN))/pytest -q --dist worksteal
 # Types are checked, and embedded_ros is tested, while other tests wait.
 BESIDE := $(MAKE) --no-print-directory --jobs 3 types embedded-tests
 

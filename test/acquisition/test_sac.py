@@ -132,7 +132,7 @@ def test_values_of_what_is_far_from_everything_tried_are_bounded_by_normalised_l
 
 
 @pytest.mark.training
-@pytest.mark.parametrize("settings", [QUICK, replace(QUICK, critic_net_arch=(24, 16))])
+@pytest.mark.parametrize("settings", [QUICK, *slow(replace(QUICK, critic_net_arch=(24, 16)))])
 def test_what_is_resumed_ends_with_the_same_weights(tmp_path, settings):
     whole = learner(settings=settings)
     for segment in range(2):

@@ -30,6 +30,7 @@ from slap_ros.skills.groundings import Groundings
 from slap_ros.skills.reward import SkillReward
 from slap_ros.skills.skill_library import AcquiredSkill
 from slap_ros.studies.lg_sail.warm_start import StartComparison
+from support.marks import slow
 from support.points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 from support.steady_skills import PICKING, towards, write_library
 
@@ -67,6 +68,7 @@ def actor(one):
     return one.policy()
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_a_good_skill_is_destroyed_without_protection_and_not_with_it():
     worst = {}
@@ -85,7 +87,7 @@ def test_a_good_skill_is_destroyed_without_protection_and_not_with_it():
 
 
 @pytest.mark.training
-@pytest.mark.parametrize("rounds", [1, 3])  # before the first update, and after it
+@pytest.mark.parametrize("rounds", [1, *slow(3)])  # before the first update, and after it
 def test_a_warm_start_that_is_resumed_ends_with_the_same_weights(tmp_path, rounds):
     whole = learner()
     whole.begin_with(PICKING.policy, WARM)

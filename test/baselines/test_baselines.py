@@ -135,7 +135,7 @@ def test_what_follows_a_long_action_is_discounted_by_its_steps():
 # -- training -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["ppo", "hierarchical", "sac", "sac-her", "sol"])
+@pytest.mark.parametrize("method", ["ppo", "hierarchical", *slow("sac", "sac-her", "sol")])
 def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     changes = {"n_envs": 2, "batch_size": 8, "validation": 1}
     changes |= {"learning_starts": 102} if "sac" in method else {"n_steps": 16}
@@ -160,7 +160,8 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
         train_baseline(method, domain, tmp_path / "x", **given)
 
 
-@pytest.mark.parametrize("name", ["stack_at_target", *slow("peg_in_hole", "stow_hammer")])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["stack_at_target", "peg_in_hole", "stow_hammer"])
 def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, name):
     """LG-SAIL's flat baseline: one policy, which observes all objects and the goal."""
     changes = {"n_envs": 1, "learning_starts": 16, "batch_size": 8, "validation": 1}

@@ -125,6 +125,7 @@ def test_friction_that_no_state_says_is_identified_from_a_bag(bag, tmp_path):
     assert calibrated.get(block, "friction") == pytest.approx(found["friction"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_friction_is_identified_where_poses_are_a_millimetre_off(pushes):
     found = [
         push

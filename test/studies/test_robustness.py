@@ -60,6 +60,7 @@ def test_the_top_block_is_not_in_what_is_planned_from_and_stands_in_the_world():
         world.step(domain.action_space.hold)
 
 
+@pytest.mark.slow
 def test_planning_for_what_is_seen_fails_where_the_tower_is_higher():
     """Its hand is to grasp the block below the one that nobody sees."""
     trial = solved("fair", True, 1)
