@@ -77,3 +77,21 @@ class DemandingSkill(Skill, Protocol):
             objects: Objects that the skill is applied to.
         """
         ...
+
+
+@runtime_checkable
+class GradualSkill(Skill, Protocol):
+    """A skill of which it is found out bit by bit how many steps it takes."""
+
+    def raised_bound(self, state: State, objects: tuple[Object, ...], steps: int) -> int:
+        """Find out more about how many steps the skill takes from a state.
+
+        Args:
+            state: State in which the skill would begin.
+            objects: Objects that the skill is applied to.
+            steps: Lower bound of the environment steps that is known.
+
+        Returns:
+            A higher bound, or ``steps`` where the skill may take so many, or cannot start.
+        """
+        ...

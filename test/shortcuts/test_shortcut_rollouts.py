@@ -78,9 +78,9 @@ def test_a_shortcut_is_tried_as_often_as_the_results_say():
     begun = []
 
     class Counted(Obstacle2DVectorWorld):
-        def reset(self, world, state):
-            begun.append(world)
-            super().reset(world, state)
+        def __init__(self, states, **settings):
+            begun.extend(states)
+            super().__init__(states, **settings)
 
     counting = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=Counted))
     encoder, state = next(situations())
