@@ -13,6 +13,20 @@ from slap_ros.relational import Object, State
 Policy = Callable[[State], Action | None]  # None: nothing left to do
 
 
+@runtime_checkable
+class ForeseeingPolicy(Protocol):
+    """A policy that was tried out in the planner's model, and knows what came of it there."""
+
+    def __call__(self, state: State) -> Action | None:
+        """See :data:`Policy`."""
+        ...
+
+    @property
+    def foreseen(self) -> State | None:
+        """The state after the newest action in the model; None where that is not known."""
+        ...
+
+
 class Skill(Protocol):
     """The control side of an operator, given or learned, for any objects.
 

@@ -134,6 +134,7 @@ class Model:
 
     def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
         self._world.reset(state)
+        is_behind = False  # the world, where steps were foreseen
         try:
             execution = OptionExecution(option, target, self.space, self._actions, state)
         except SkillNotApplicableError as error:
@@ -144,7 +145,13 @@ class Model:
             action = execution.advance(state, abstract)
             if isinstance(action, OptionResult):
                 return Rollout(action.reached, execution.steps, state, abstract, action)
-            state = self._world.step(action)
+            foreseen = execution.foreseen
+            if foreseen is not None:
+                state, is_behind = foreseen, True
+                continue
+            if is_behind:
+                self._world.reset(state)
+            state, is_behind = self._world.step(action), False
 
 
 class CountedModel(Model):

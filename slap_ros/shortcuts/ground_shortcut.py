@@ -129,19 +129,23 @@ class RolloutFollower:
             grasp: Atoms about what is held that must stay as they are, a mask.
         """
         self._skill, self._grasp = skill, grasp
-        self._predicted: Sequence[tuple[State, Weights]] = list(
-            zip(rollout.states, rollout.actions, strict=True)
+        after = (*rollout.states[1:], rollout.final)
+        self._predicted: Sequence[tuple[State, Weights, State]] = list(
+            zip(rollout.states, rollout.actions, after, strict=True)
         )
         self._step = 0
+        self.foreseen: State | None = None
 
     def __call__(self, state: State) -> Action | None:
         """The next action; None where the shortcut cannot succeed any more."""
+        self.foreseen = None
         if self._skill.encoder.kept_grasp(state) != self._grasp:
             return None
         if self._step < len(self._predicted):
-            predicted, action = self._predicted[self._step]
+            predicted, action, after = self._predicted[self._step]
             if self._is_as_predicted(state, predicted):
                 self._step += 1
+                self.foreseen = after if state == predicted else None
                 return self._skill.command(action)
         self._predicted = ()
         observations = self._skill.encoder.encode(state.alone()).observations

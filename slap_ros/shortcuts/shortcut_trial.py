@@ -36,10 +36,12 @@ class ShortcutRollout:
     Args:
         actions: Actions of the policy, from -1 to 1, one per step.
         states: States in which the actions were chosen, one per step.
+        final: State in which it ended.
     """
 
     actions: tuple[Weights, ...]
     states: tuple[State, ...]
+    final: State
 
     @property
     def steps(self) -> int:
@@ -145,7 +147,8 @@ class RolloutBatch:
         self.states = self._worlds.step(commands)
         self._encoding = encoding = self._encoder.encode(self.states)
         success = self._alive & self._encoder.success(self.states, encoding, self._targets)
-        self.reached += [_rollout(self._past, int(world)) for world in np.flatnonzero(success)]
+        for world in np.flatnonzero(success).tolist():
+            self.reached.append(_rollout(self._past, self.states, world))
         self._alive &= ~success & ~encoding.failure
 
 
@@ -294,12 +297,18 @@ def _steps(rollout: ShortcutRollout) -> int:
     return rollout.steps
 
 
-def _rollout(past: Sequence[tuple[State, Weights]], world: int) -> ShortcutRollout:
-    """The rollout that was made in one of the worlds, copied: a view would keep all of them."""
+def _rollout(past: Sequence[tuple[State, Weights]], now: State, world: int) -> ShortcutRollout:
+    """The rollout that was made in one of the worlds, up to now."""
     return ShortcutRollout(
         tuple(actions[world].copy() for _, actions in past),
-        tuple(State(states.layout, states.data[world].copy()) for states, _ in past),
+        tuple(_alone(states, world) for states, _ in past),
+        _alone(now, world),
     )
+
+
+def _alone(states: State, world: int) -> State:
+    """The state of one of the worlds, copied: a view would keep all of them."""
+    return State(states.layout, states.data[world].copy())
 
 
 def _mean(policy: SampledPolicy) -> Actor:
