@@ -22,7 +22,7 @@ from slap_ros.shortcuts.signature import Change
 
 MAX_NET_FAILURES = 3  # failures, less as many for each success, before a shortcut is given up
 MOST_KEPT = 2_000  # states for which successful rollouts are kept
-MOST_BEGUN = 32  # trials that are interrupted; each keeps the states of all its rollouts
+MOST_BEGUN = 16  # trials that are interrupted; each keeps the states of all its rollouts
 # Variations of a success are assumed to take half of its steps or more.
 VARIED = 2
 
