@@ -24,6 +24,7 @@ Float = TypeVar("Float", np.float32, np.float64)
 # In rad, m, or parts of an action's range. Four micrometres are far below what a robot's joints
 # repeat. A power of two, so that products and quotients with it are exact.
 RESOLUTION = 2.0**-18
+PER_UNIT = 2.0**18  # multiples of it in 1; exact, and times faster than over
 LN_2 = 0.6931471805599453
 LOG2_E = 1.4426950408889634
 LARGEST_EXPONENT = 700.0  # exp of it is still finite
@@ -31,6 +32,7 @@ LARGEST_EXPONENT = 700.0  # exp of it is still finite
 EXP_COEFFICIENTS = tuple(1.0 / math.factorial(power) for power in range(9, -1, -1))
 EXPONENT_BIAS, MANTISSA_BITS = 1023, 52  # of a 64-bit float's exponent, and those below it
 SATURATED = 20.0  # where tanh differs from 1 by 1e-17
+UNSURE = 1e-5  # of the resolution, 4e-11: no two implementations of tanh differ by so much
 
 PI, HALF_PI = 3.141592653589793, 1.5707963267948966
 QUARTER_TURNS = 0.6366197723675814  # in a radian
@@ -55,7 +57,7 @@ def on_grid(values: NDArray[Float]) -> NDArray[Float]:
     Values that differ in their last bits become equal, except where an odd multiple of half the
     resolution lies between them: about one pair in 10^10 of 64-bit values near 1. Zero has no sign.
     """
-    rounded: NDArray[Float] = np.rint(values / RESOLUTION)
+    rounded: NDArray[Float] = np.rint(values * PER_UNIT)
     rounded *= RESOLUTION  # in place here and below: half of the time was new arrays
     rounded += 0.0
     return rounded
@@ -95,6 +97,27 @@ def tanh(values: Array) -> Array:
     result = np.copysign(result, values)
     result += 0.0  # zero has no sign
     return np.where(np.isnan(values), np.nan, result)
+
+
+def tanh_on_grid(values: Array) -> Array:
+    """``on_grid(tanh(values))`` to the bit, three times as fast.
+
+    The library's own function differs from ours in digits that rounding hides. Only where it may
+    not, because the value is half-way between two multiples of the resolution, ours decides.
+
+    Args:
+        values: Numbers of any shape.
+    """
+    scaled = np.tanh(values)
+    scaled *= PER_UNIT
+    rounded: Array = np.rint(scaled)
+    scaled -= rounded
+    unsure = np.abs(scaled, out=scaled) > 0.5 - UNSURE
+    rounded *= RESOLUTION
+    if unsure.any():
+        rounded[unsure] = on_grid(tanh(values[unsure]))
+    rounded += 0.0
+    return rounded
 
 
 def sin_cos(angles: Array) -> tuple[Array, Array]:

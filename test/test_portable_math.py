@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh
+from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh, tanh_on_grid
 from tools.processors import PLAN, PROCESSORS, RECORDED_RUN, differences, main
 
 VALUES = np.concatenate([np.linspace(-30.0, 30.0, 20001), [-1e-9, 0.0, 1e-9, -800.0, 800.0]])
@@ -14,6 +14,14 @@ VALUES = np.concatenate([np.linspace(-30.0, 30.0, 20001), [-1e-9, 0.0, 1e-9, -80
 def test_exp_and_tanh_are_those_of_numpy():
     np.testing.assert_allclose(exp(VALUES[:-2]), np.exp(VALUES[:-2]), rtol=1e-11)
     np.testing.assert_allclose(tanh(VALUES), np.tanh(VALUES), atol=1e-11)
+
+
+def test_tanh_on_the_grid_is_the_rounded_tanh_to_the_bit():
+    halves = np.arctanh((np.arange(-3000, 3000) + 0.5) * RESOLUTION)  # where rounding is unsure
+    odd = np.array([0.0, -0.0, np.nan, np.inf, -np.inf, 1e-300, -1e-9])
+    random = np.random.default_rng(0).standard_normal(300_000)
+    for values in (odd, VALUES, halves, np.nextafter(halves, 1.0), random, 9.0 * random):
+        assert tanh_on_grid(values).tobytes() == on_grid(tanh(values)).tobytes()
 
 
 def test_tanh_of_what_is_no_number():

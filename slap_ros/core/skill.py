@@ -13,6 +13,20 @@ from slap_ros.relational import Object, State
 Policy = Callable[[State], Action | None]  # None: nothing left to do
 
 
+@runtime_checkable
+class ForeseeingPolicy(Protocol):
+    """A policy that was tried out in the planner's model, and knows what came of it there."""
+
+    def __call__(self, state: State) -> Action | None:
+        """See :data:`Policy`."""
+        ...
+
+    @property
+    def foreseen(self) -> State | None:
+        """The state after the newest action in the model; None where that is not known."""
+        ...
+
+
 class Skill(Protocol):
     """The control side of an operator, given or learned, for any objects.
 
@@ -75,5 +89,23 @@ class DemandingSkill(Skill, Protocol):
         Args:
             state: Current state.
             objects: Objects that the skill is applied to.
+        """
+        ...
+
+
+@runtime_checkable
+class GradualSkill(Skill, Protocol):
+    """A skill of which it is found out bit by bit how many steps it takes."""
+
+    def raised_bound(self, state: State, objects: tuple[Object, ...], steps: int) -> int:
+        """Find out more about how many steps the skill takes from a state.
+
+        Args:
+            state: State in which the skill would begin.
+            objects: Objects that the skill is applied to.
+            steps: Lower bound of the environment steps that is known.
+
+        Returns:
+            A higher bound, or ``steps`` where the skill may take so many, or cannot start.
         """
         ...

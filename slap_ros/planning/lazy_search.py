@@ -6,6 +6,11 @@ What it finds, and under which bounds, is told in :mod:`slap_ros.planning.search
 above 1 it is Lazy Weighted A* (Cohen, Phillips and Likhachev: Planning single-arm manipulations
 with n-arm robots, RSS 2014): bounds of what is still to come count more than steps that were rolled
 out, so that a first plan is found soon, and is at most that many times as long as the shortest.
+
+Where a skill tells bit by bit how long it takes, an edge comes to the front again and again, each
+time with a bound that is a little higher. What could only be longer than the plan is never rolled
+out to its end. The plan is the one that whole roll-outs would lead to, since the order of all else
+is as if the edge had been rolled out when it first came to the front.
 """
 
 from __future__ import annotations
@@ -73,6 +78,7 @@ class _QueueEntry:
     vertex: Vertex = field(compare=False)
     edge: Edge | None = field(compare=False)
     least_steps: int = field(compare=False)  # environment steps that the edge takes
+    ties: tuple[int, int] | None = field(compare=False, default=None)  # of what comes of the edge
     f: int = field(compare=False, default=0)  # lower bound of the steps of any plan through it
 
     @property
@@ -90,23 +96,47 @@ class _Frontier:
         self._queue: list[_QueueEntry] = []
         self._tie = count()
 
-    def push(self, vertex: Vertex, edge: Edge | None = None, least_steps: int = 0) -> None:
+    def push(
+        self,
+        vertex: Vertex,
+        edge: Edge | None = None,
+        least_steps: int = 0,
+        tie: int | None = None,
+    ) -> None:
         """Put a vertex or an edge into the queue, if a goal can be reached through it.
 
         Args:
             vertex: To be expanded.
             edge: To be rolled out from the vertex instead.
             least_steps: Lower bound of the environment steps that the edge takes.
+            tie: Turn of the entry among equals; None for a turn before all entries so far.
         """
-        # Deeper first among equals: they are nearer to the goal.
-        self._put(_QueueEntry(0.0, -next(self._tie), vertex, edge, least_steps))
+        turn = self.next_tie() if tie is None else tie
+        self._put(_QueueEntry(0.0, turn, vertex, edge, least_steps))
+
+    def next_tie(self) -> int:
+        """Deeper first among equals: they are nearer to the goal."""
+        return -next(self._tie)
+
+    def put_back(self, entry: _QueueEntry, least_steps: int) -> None:
+        """Put an edge back of which a part was rolled out, with a higher bound.
+
+        Args:
+            entry: Entry that came to the front.
+            least_steps: Lower bound of the environment steps that the edge takes.
+        """
+        entry.least_steps = least_steps
+        entry.ties = entry.ties or (self.next_tie(), self.next_tie())
+        entry.tie = entry.ties[1]  # before what may come of it, as if that were there already
+        self._put(entry)
 
     def _put(self, entry: _QueueEntry) -> None:
         h = self._h[entry.node]
         if h is not None:
-            to_come = entry.least_steps + h
-            entry.f = entry.vertex.g + to_come
-            entry.priority = entry.vertex.g + self._weight * to_come
+            rolled_out = entry.least_steps if entry.ties else 0  # without success
+            so_far, to_come = entry.vertex.g + rolled_out, entry.least_steps - rolled_out + h
+            entry.f = so_far + to_come
+            entry.priority = so_far + self._weight * to_come
             heapq.heappush(self._queue, entry)
 
     def pop(self) -> _QueueEntry | None:
@@ -159,7 +189,7 @@ class _LazySearch:
             if edge is not None:
                 if self._is_too_much(vertex, edge):
                     return self._stopped(best)
-                self._evaluate(vertex, edge)
+                self._evaluate(best, edge)
             elif vertex.node in self._goals:
                 return SearchOutcome(plan_to(self._graph, vertex), at_least=self._at_least(best))
             elif vertex.g == self._cheapest[vertex.key]:
@@ -177,6 +207,9 @@ class _LazySearch:
     def _stopped(self, best: _QueueEntry) -> SearchOutcome:
         """The outcome at the limit of roll-outs: the best plan that waits in the queue."""
         at_least = self._at_least(best)
+        for entry in list(self._frontier.waiting()):
+            if entry.ties and entry.edge is not None:
+                self._roll_out(entry, entry.edge)
         goals = [one for one in self._frontier.waiting() if one.vertex.node in self._goals]
         if goals:
             nearest = min(goals, key=lambda one: one.vertex.g)
@@ -201,27 +234,41 @@ class _LazySearch:
             bound = skill.lower_bound(vertex.state, edge.option.objects)
             self._frontier.push(vertex, edge, max(skill.least_steps, bound))
 
-    def _evaluate(self, vertex: Vertex, edge: Edge) -> None:
-        """Roll an edge out, and queue where it leads and its next attempt."""
-        if edge.option.given_up():
+    def _evaluate(self, entry: _QueueEntry, edge: Edge) -> None:
+        """Roll an edge out, or so much of it that its bound rises."""
+        if entry.ties is None and edge.option.given_up():
             return
-        target = self._target(edge)
+        state, least = entry.vertex.state, entry.least_steps
+        raised = self._model.raised_bound(edge.option, state, self._target(edge), least)
+        if raised > least:
+            self._frontier.put_back(entry, raised)
+            self._drop_given_up(edge)
+        else:
+            self._roll_out(entry, edge)
+
+    def _roll_out(self, entry: _QueueEntry, edge: Edge) -> None:
+        """Roll an edge out to its end, and queue where it leads and its next attempt."""
+        vertex, target = entry.vertex, self._target(edge)
         rollout = self._model.roll_out(edge.option, vertex.state, target)
         if edge.option.attempt == 0:
             self._failures.add(edge.option, target, rollout)
         if rollout.reached:
+            mine, following = entry.ties or (None, None)
             g = vertex.g + rollout.steps
             reached = Vertex(edge.target, rollout.final, g, vertex, edge)
             if g < self._cheapest.get(reached.key, g + 1):
                 self._cheapest[reached.key] = g
-                self._frontier.push(reached)
-            following = edge.option.next_attempt()
-            if following is not None:  # it takes longer, but the next option may take less
-                self._frontier.push(vertex, replace(edge, option=following), rollout.steps)
+                self._frontier.push(reached, tie=mine)
+            option = edge.option.next_attempt()
+            if option is not None:  # it takes longer, but the next option may take less
+                self._frontier.push(vertex, replace(edge, option=option), rollout.steps, following)
             return
         if rollout.moved_and_failed and edge.option.kind is OptionKind.OPERATOR:
             g = vertex.g + rollout.steps
             self._failed.append(Vertex(edge.target, rollout.final, g, vertex, edge))
+        self._drop_given_up(edge)
+
+    def _drop_given_up(self, edge: Edge) -> None:
         if edge.option.given_up():
             self._frontier.drop_given_up()
 

@@ -7,13 +7,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from slap_ros.core import ActionSpace, Domain, World
+from slap_ros.core import ActionSpace, Domain, GradualSkill, World
 from slap_ros.errors import ErrorCode, SkillNotApplicableError
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State, Target
 
 REACHED = OptionResult(ErrorCode.NONE)
 MOST_KEPT = 20_000  # roll-outs: some fifty plans that take all of their effort
+
+Key = tuple[Option, Target, bytes]
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,8 @@ class Model:
         self.executed = 0  # roll-outs made so far; those from the cache do not count
         self._world = world
         self._actions = actions
-        self._cache: dict[tuple[Option, Target, bytes], Rollout] = {}
+        self._cache: dict[Key, Rollout] = {}
+        self._begun: dict[Key, None] = {}  # roll-outs of which a part was made
 
     @classmethod
     def of(cls, domain: Domain, initial: State) -> Self:
@@ -67,14 +70,46 @@ class Model:
         return cls(domain.model_world(initial), domain.atom_space(initial), domain.action_space)
 
     def knows(self, option: Option, state: State, target: Target) -> bool:
-        """Whether a roll-out was made before.
+        """Whether a roll-out was made or begun before.
 
         Args:
             option: What would be executed.
             state: Where it would start.
             target: Where it should end.
         """
-        return (option, target, state.key) in self._cache
+        key = (option, target, state.key)
+        return key in self._cache or key in self._begun
+
+    def raised_bound(self, option: Option, state: State, target: Target, steps: int) -> int:
+        """A better bound of an option's steps, by a part of its roll-out; that counts as one.
+
+        Args:
+            option: What would be executed.
+            state: Where it would start.
+            target: Where it should end.
+            steps: Lower bound of the environment steps that is known.
+
+        Returns:
+            A higher bound; ``steps`` where the roll-out has to be made to find out more.
+        """
+        key = (option, target, state.key)
+        raised = steps if key in self._cache else self._raised(option, state, target, steps)
+        if raised > steps and key not in self._begun:
+            self._begin(key)
+        return raised
+
+    def _raised(self, option: Option, state: State, target: Target, steps: int) -> int:
+        del target
+        skill = option.skill
+        if not isinstance(skill, GradualSkill):
+            return steps
+        return skill.raised_bound(state, option.objects, steps)
+
+    def _begin(self, key: Key) -> None:
+        self.executed += 1
+        self._begun[key] = None
+        if len(self._begun) > MOST_KEPT:
+            del self._begun[next(iter(self._begun))]  # the oldest
 
     def roll_out(self, option: Option, state: State, target: Target) -> Rollout:
         """Execute an option until it reaches its target or ends otherwise.
@@ -89,7 +124,9 @@ class Model:
         """
         key = (option, target, state.key)
         if key not in self._cache:
-            self.executed += 1
+            if key not in self._begun:
+                self._begin(key)
+            del self._begun[key]
             self._cache[key] = self._simulate(option, state, target)
             if len(self._cache) > MOST_KEPT:
                 del self._cache[next(iter(self._cache))]  # the oldest
@@ -97,6 +134,7 @@ class Model:
 
     def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
         self._world.reset(state)
+        is_behind = False  # the world, where steps were foreseen
         try:
             execution = OptionExecution(option, target, self.space, self._actions, state)
         except SkillNotApplicableError as error:
@@ -107,7 +145,13 @@ class Model:
             action = execution.advance(state, abstract)
             if isinstance(action, OptionResult):
                 return Rollout(action.reached, execution.steps, state, abstract, action)
-            state = self._world.step(action)
+            foreseen = execution.foreseen
+            if foreseen is not None:
+                state, is_behind = foreseen, True
+                continue
+            if is_behind:
+                self._world.reset(state)
+            state, is_behind = self._world.step(action), False
 
 
 class CountedModel(Model):
@@ -121,6 +165,9 @@ class CountedModel(Model):
         """Count what is asked of a model from now on."""
         super().__init__(model._world, model.space, model._actions)
         self._model = model
+
+    def _raised(self, option: Option, state: State, target: Target, steps: int) -> int:
+        return self._model.raised_bound(option, state, target, steps)
 
     def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
         return self._model.roll_out(option, state, target)

@@ -10,7 +10,15 @@ from enum import Enum
 
 import numpy as np
 
-from slap_ros.core import Action, ActionSpace, DemandingSkill, Domain, Policy, Skill
+from slap_ros.core import (
+    Action,
+    ActionSpace,
+    DemandingSkill,
+    Domain,
+    ForeseeingPolicy,
+    Policy,
+    Skill,
+)
 from slap_ros.errors import ErrorCode, InvalidCommandError, UnknownSkillError
 from slap_ros.relational import AtomSpace, Object, State, Target
 
@@ -231,6 +239,11 @@ class OptionExecution:
             return OptionResult(error.code, f"{self.option}: {error}")
         self.steps += 1
         return action
+
+    @property
+    def foreseen(self) -> State | None:
+        """The state after the newest action in the model; None where the policy does not know."""
+        return self._policy.foreseen if isinstance(self._policy, ForeseeingPolicy) else None
 
     @property
     def _step_limit(self) -> int:

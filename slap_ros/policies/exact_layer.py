@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,9 +68,15 @@ class ExactLayer:
         Args:
             inputs: Inputs, multiples of ``RESOLUTION`` within the bound, shape (n, in).
         """
-        coarse, fine = (inputs @ part for part in self.parts)
-        outputs: Values = coarse + fine + self.bias
+        both = inputs @ self._side_by_side
+        outputs: Values = both[:, : len(self.bias)] + both[:, len(self.bias) :]
+        outputs += self.bias
         return outputs
+
+    @cached_property
+    def _side_by_side(self) -> Values:
+        """Both parts in one matrix: one product takes less time than two."""
+        return np.concatenate(self.parts, axis=1)
 
 
 def _largest_sum(weights: Values) -> float:

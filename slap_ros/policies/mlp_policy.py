@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.policies.exact_layer import ExactLayer
-from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh
+from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh, tanh_on_grid
 
 LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
 # Largest number of observations at once. OpenBLAS spreads larger products over threads, which
@@ -56,6 +56,11 @@ def _relu(values: Values) -> Values:
 
 # Each rises with its argument, so that the largest argument gives the largest result.
 ACTIVATIONS: Mapping[str, Callable[[Values], Values]] = {"tanh": tanh, "relu": _relu}
+# The same, rounded to the grid.
+ON_GRID: Mapping[str, Callable[[Values], Values]] = {
+    "tanh": tanh_on_grid,
+    "relu": lambda values: on_grid(_relu(values)),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,13 +121,14 @@ class MlpPolicy:
         return np.concatenate([self._mean(observations[i : i + MAX_BATCH]) for i in rows])
 
     def _mean(self, observations: Weights) -> Weights:
-        activate = ACTIVATIONS[self.activation]
+        activate = ON_GRID[self.activation]
         *hidden, last = self._exact_layers
         values = on_grid(self.normalisation(observations).astype(np.float64))
         for layer in hidden:
-            values = on_grid(activate(layer(values)))
+            values = activate(layer(values))
         actions = last(values)
-        return on_grid(tanh(actions) if self.squashed else actions).astype(np.float32)
+        rounded = tanh_on_grid(actions) if self.squashed else on_grid(actions)
+        return rounded.astype(np.float32)
 
     def sample(
         self, observations: Weights, rng: np.random.Generator, temperature: float | Weights = 1.0

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +15,8 @@ from slap_ros.policies.mlp_policy import Weights
 from slap_ros.relational import Object, State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Shortcut
-from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
+from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
+from slap_ros.shortcuts.shortcut_trial import ShortcutRollout
 from slap_ros.shortcuts.signature import Change
 
 STATE_TOLERANCE = 1e-6  # in any feature's unit: up to here a state is as predicted
@@ -38,15 +39,21 @@ class GroundShortcut:
         shortcut: Learned shortcut that is applied to the objects.
         change: Change of atoms that the shortcut makes in this task.
         attempt: Number of the successful rollout that it follows, from 0, the shortest first.
-        encoder: Encoder of observations for that change.
+        make_encoder: Gives the encoder of observations for that change, which most edges of a graph
+            never need.
         rollouts: Rollouts in the model, in which the shortcut is tried out.
     """
 
     shortcut: Shortcut
     change: Change
     attempt: int
-    encoder: ObservationEncoder = field(compare=False, repr=False)
+    make_encoder: Callable[[], ObservationEncoder] = field(compare=False, repr=False)
     rollouts: ShortcutRollouts = field(compare=False, repr=False)
+
+    @property
+    def encoder(self) -> ObservationEncoder:
+        """Encoder of observations for the change; the same one for each attempt."""
+        return self.make_encoder()
 
     @property
     def name(self) -> str:
@@ -67,6 +74,13 @@ class GroundShortcut:
         """A number of environment steps, the same from every state; see :func:`least_steps`."""
         del state, objects
         return self.least_steps
+
+    def raised_bound(self, state: State, objects: tuple[Object, ...], steps: int) -> int:
+        """See :class:`~slap_ros.core.GradualSkill`; the first attempt alone is tried out."""
+        del objects
+        if self.attempt:
+            return steps
+        return self.rollouts.raised_bound(self.shortcut, self.encoder, state, steps)
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Try the shortcut out, and follow a successful rollout.
@@ -115,19 +129,23 @@ class RolloutFollower:
             grasp: Atoms about what is held that must stay as they are, a mask.
         """
         self._skill, self._grasp = skill, grasp
-        self._predicted: Sequence[tuple[State, Weights]] = list(
-            zip(rollout.states, rollout.actions, strict=True)
+        after = (*rollout.states[1:], rollout.final)
+        self._predicted: Sequence[tuple[State, Weights, State]] = list(
+            zip(rollout.states, rollout.actions, after, strict=True)
         )
         self._step = 0
+        self.foreseen: State | None = None
 
     def __call__(self, state: State) -> Action | None:
         """The next action; None where the shortcut cannot succeed any more."""
+        self.foreseen = None
         if self._skill.encoder.kept_grasp(state) != self._grasp:
             return None
         if self._step < len(self._predicted):
-            predicted, action = self._predicted[self._step]
+            predicted, action, after = self._predicted[self._step]
             if self._is_as_predicted(state, predicted):
                 self._step += 1
+                self.foreseen = after if state == predicted else None
                 return self._skill.command(action)
         self._predicted = ()
         observations = self._skill.encoder.encode(state.alone()).observations

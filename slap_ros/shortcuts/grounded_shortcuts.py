@@ -12,12 +12,13 @@ from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
 from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.policies.learner_interface import learner_interface
-from slap_ros.relational import State, Target
+from slap_ros.relational import Object, State, Target
 from slap_ros.shortcuts.ground_shortcut import GroundShortcut, least_steps
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.sampling import DEFAULT, Sampling
 from slap_ros.shortcuts.shortcut import Shortcut
-from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
+from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
+from slap_ros.shortcuts.shortcut_trial import ShortcutRollout
 from slap_ros.shortcuts.signature import Change, concerned
 from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
@@ -49,6 +50,7 @@ class GroundedShortcuts:
         self._matchers = [SignatureMatcher(*each) for each in about]
         self._grounders = [SignatureGrounder(*each) for each in about]
         self._encoders: dict[tuple[str, Change], ObservationEncoder] = {}
+        self._concerned: dict[Change, tuple[Object, ...]] = {}
 
     def edges(self, graph: AbstractGraph) -> list[Edge]:
         """An edge for each pair of nodes that no option joins and a shortcut may (Alg. 2)."""
@@ -101,19 +103,29 @@ class GroundedShortcuts:
         return self._rollouts.cached()
 
     def _option(self, shortcut: Shortcut, change: Change, attempt: int = 0) -> Option:
-        key = (shortcut.name, change)
-        if key not in self._encoders:
-            self._encoders[key] = ObservationEncoder(
-                self._domain, self._space, shortcut.signature, change
-            )
-        encoder = self._encoders[key]
+        encoder = partial(self._encoder, shortcut, change)
         return Option(
             OptionKind.SHORTCUT,
             GroundShortcut(shortcut, change, attempt, encoder, self._rollouts),
-            concerned(change, self._space),
-            accepts=encoder.accepts,
+            self._objects(change),
+            accepts=lambda state: encoder().accepts(state),
             attempt=attempt,
             next_attempt=lambda: self._option(shortcut, change, attempt + 1),
             given_up=lambda: self._rollouts.given_up(shortcut),
             deletes=None if self._domain.exact else change.delete,
         )
+
+    def _encoder(self, shortcut: Shortcut, change: Change) -> ObservationEncoder:
+        """The encoder of a shortcut for a change, made when it is needed."""
+        key = (shortcut.name, change)
+        if key not in self._encoders:
+            self._encoders[key] = ObservationEncoder(
+                self._domain, self._space, shortcut.signature, change
+            )
+        return self._encoders[key]
+
+    def _objects(self, change: Change) -> tuple[Object, ...]:
+        """The objects of a change; the same change joins many pairs of nodes."""
+        if change not in self._concerned:
+            self._concerned[change] = concerned(change, self._space)
+        return self._concerned[change]

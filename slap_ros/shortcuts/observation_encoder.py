@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -118,27 +119,76 @@ class _Atoms:
         return deficits
 
 
-@dataclass(frozen=True)
 class Encoding:
-    """Observations, potential and outcome of each of n states.
+    """Observations, potential and outcome of each of n states; what is not asked for costs nothing.
 
-    Args:
-        observations: Observations for the policy, shape (n, size); of the same size for all changes
-            that the signature matches.
-        potential: Potential for shaping rewards, about minus the steps to go, shape (n,). Four
-            terms: the deficits of the changed atoms, through the metric behind each predicate; the
-            way to the lowest object with a deficit, as it carries the others; where everything is
-            in place but still moves, how close the hand is; and the joint limit penalty.
+    Attributes:
         achieved: Whether all changed atoms are achieved, past their thresholds by the success
             tolerance, and nothing moves, shape (n,).
         failure: Whether something happened that cannot be undone, shape (n,): the domain says
             so, or an object was released elsewhere than where it should be.
     """
 
-    observations: NDArray[np.float32]
-    potential: Array
-    achieved: Bools
-    failure: Bools
+    def __init__(self, encoder: ObservationEncoder, state: State) -> None:
+        """Find out how the episodes stand.
+
+        Args:
+            encoder: Encoder for the change to be made.
+            state: Batch of n states, whose data nobody changes as long as the encoding is asked.
+        """
+        self._encoder, self._state = encoder, state
+        self._deficits = encoder.deficits(state)
+        holds = self._deficits < ACHIEVED
+        self._at_rest = encoder.interface.at_rest(state)
+        self._in_place: Bools = np.logical_and.reduce(holds, axis=-1)
+        self.achieved: Bools = self._in_place & self._at_rest
+        dropped = encoder.released(holds) & self._at_rest & ~self.achieved
+        self.failure: Bools = encoder.interface.failed(state) | dropped
+
+    @cached_property
+    def observations(self) -> NDArray[np.float32]:
+        """Observations for the policy, of the same size for all changes that the signature matches.
+
+        Returns:
+            Shape (n, size).
+        """
+        return self._encoder.observe(self._state, self._hand, self._object_deficits)
+
+    @cached_property
+    def potential(self) -> Array:
+        """The potential for shaping rewards, about minus the steps to go, shape (n,).
+
+        Four terms: the deficits of the changed atoms, through the metric behind each predicate; the
+        way to the lowest object with a deficit, as it carries the others; where everything is in
+        place but still moves, how close the hand is; and the joint limit penalty.
+        """
+        encoder, moves = self._encoder, self._in_place & ~self._at_rest
+        closeness = np.where(moves, encoder.closeness(self._distances), 0.0)
+        potential: Array = (
+            -encoder.effort(self._deficits, self._object_deficits, self._distances)
+            - PROXIMITY_WEIGHT * closeness
+            - JOINT_LIMIT_WEIGHT * encoder.interface.joint_limit_penalty(self._state)
+        )
+        return potential
+
+    @cached_property
+    def _hand(self) -> Array:
+        return self._encoder.interface.hand(self._state)
+
+    @cached_property
+    def _distances(self) -> Array:
+        return self._encoder.distances(self._state, self._hand)
+
+    @cached_property
+    def _object_deficits(self) -> Array:
+        return self._encoder.object_deficits(self._state, self._deficits, self._movable)
+
+    @property
+    def _movable(self) -> Bools:
+        """Which objects the hand may go to, shape (objects,): the same in every state."""
+        first = State(self._state.layout, self._state.data[:1])
+        movable: Bools = np.isfinite(self._encoder.distances(first, self._hand[:1])[0])
+        return movable
 
 
 class ObservationEncoder:
@@ -213,23 +263,21 @@ class ObservationEncoder:
 
     def encode(self, state: State) -> Encoding:
         """Encode states, a batch of shape (n, layout.size)."""
+        return Encoding(self, state)
+
+    def deficits(self, state: State) -> Array:
+        """Deficits of the changed atoms, 0 where achieved, shape (n, atoms)."""
         length = self.interface.length_m
-        deficits = np.concatenate([g.deficits(state, length) for g in self._atoms], axis=-1)
-        hand = self.interface.hand(state)
-        distances = self._distances(state, hand)
-        object_deficits = self._object_deficits(state, deficits, distances)
-        holds, at_rest = deficits < ACHIEVED, self.interface.at_rest(state)
-        in_place = holds.all(axis=-1)
-        achieved = in_place & at_rest
-        dropped = holds[:, self._releasing].any(axis=-1) & at_rest & ~achieved
-        return Encoding(
-            self._observe(state, hand, object_deficits),
-            self._potential(deficits, object_deficits, distances)
-            - PROXIMITY_WEIGHT * np.where(in_place & ~at_rest, self._closeness(distances), 0.0)
-            - JOINT_LIMIT_WEIGHT * self.interface.joint_limit_penalty(state),
-            achieved,
-            self.interface.failed(state) | dropped,
-        )
+        return np.concatenate([group.deficits(state, length) for group in self._atoms], axis=-1)
+
+    def released(self, holds: Bools) -> Bools:
+        """Whether the shortcut has emptied the hand, shape (n,).
+
+        Args:
+            holds: Whether each changed atom is achieved, shape (n, atoms).
+        """
+        released: Bools = np.logical_or.reduce(holds[:, self._releasing], axis=-1)
+        return released
 
     def success(self, state: State, encoding: Encoding, targets: Sequence[int]) -> Bools:
         """Whether each state is one in which the shortcut ends.
@@ -246,10 +294,16 @@ class ObservationEncoder:
             Shape (n,).
         """
         success = encoding.achieved.copy()
-        for i in np.flatnonzero(success):
-            abstract = self.space.abstract(State(state.layout, state.data[i]))
-            success[i] = self._target(targets[int(i)]).reached(abstract)
+        rows = np.flatnonzero(success).tolist()
+        for i, abstract in zip(rows, self._abstract_each(state, rows), strict=True):
+            success[i] = self._target(targets[i]).reached(abstract)
         return success
+
+    def _abstract_each(self, state: State, rows: Sequence[int]) -> Sequence[int]:
+        """Abstract states of some of a batch of states, masks."""
+        if len(rows) > 1:
+            return self.space.abstract_each(State(state.layout, state.data[rows]))
+        return [self.space.abstract(State(state.layout, state.data[i])) for i in rows]
 
     def _target(self, abstract: int) -> Target:
         """The target that stands for an abstract state, a mask."""
@@ -274,21 +328,28 @@ class ObservationEncoder:
         """Whether a shortcut may end in this state once its target's atoms hold."""
         return bool(self.encode(state.alone()).achieved[0])
 
-    def _distances(self, state: State, hand: Array) -> Array:
+    def distances(self, state: State, hand: Array) -> Array:
         """Distances to each object from the hand, m, shape (n, objects); infinite to a place."""
         distances = np.full((len(state.data), len(self.objects)), np.inf)
         for _, column, numbers in self._kinds:
             distances[:, numbers] = self.interface.distance(state, hand, column)
         return distances
 
-    def _object_deficits(self, state: State, deficits: Array, distances: Array) -> Array:
-        """The largest deficit among each object's atoms, shape (n, objects).
+    def object_deficits(self, state: State, deficits: Array, movable: Bools) -> Array:
+        """The largest deficit among each object's atoms.
 
         The deficit of an atom that is only about places counts for the nearest object that can be
         moved: a block in the wrong place is what is to be moved, not the place.
+
+        Args:
+            state: Batch of n states.
+            deficits: Deficits of the changed atoms, shape (n, atoms).
+            movable: Which objects can be moved, shape (objects,).
+
+        Returns:
+            Shape (n, objects).
         """
         own: Array = (deficits[:, :, None] * self._incidence).max(axis=1)
-        movable = np.isfinite(distances[0])
         orphans = self._placing & ~(self._incidence & movable).any(axis=1)
         if not orphans.any() or not movable.any():
             return own
@@ -302,8 +363,17 @@ class ObservationEncoder:
             own[rows, nearest] = np.maximum(own[rows, nearest], due[:, i])
         return own
 
-    def _potential(self, deficits: Array, object_deficits: Array, distances: Array) -> Array:
-        """The potential: one object after the other, in order; each in place is a step forward."""
+    def effort(self, deficits: Array, object_deficits: Array, distances: Array) -> Array:
+        """What is still to be done, one object after the other, in order.
+
+        Args:
+            deficits: Deficits of the changed atoms, shape (n, atoms).
+            object_deficits: Largest deficits of each object's atoms, shape (n, objects).
+            distances: Distances of the objects from the hand, m, shape (n, objects).
+
+        Returns:
+            About the steps to go, shape (n,).
+        """
         # The grasp comes last: a release counts for nothing before everything is in place.
         due = np.where(self._placing, deficits, 0.0).max(axis=-1, keepdims=True)
         deficits = np.where(self._placing, deficits, np.maximum(deficits, due))
@@ -311,16 +381,23 @@ class ObservationEncoder:
         every, first = np.arange(len(left)), left.argmax(axis=-1)
         way = np.where(left.any(axis=-1), distances[every, first] / self.interface.length_m, 0.0)
         pending = PENDING_OBJECT_WEIGHT * np.maximum(left.sum(axis=-1) - 1, 0)
-        potential: Array = -(ATOM_WEIGHT * deficits.sum(axis=-1) + way + pending)
-        return potential
+        effort: Array = ATOM_WEIGHT * deficits.sum(axis=-1) + way + pending
+        return effort
 
-    def _closeness(self, distances: Array) -> Array:
+    def closeness(self, distances: Array) -> Array:
         """How close the hand is to the nearest object, 0 to 1: what it touches does not rest."""
         nearest = distances.min(axis=-1, initial=np.inf)
         closeness: Array = np.maximum(1.0 - nearest / self.interface.length_m, 0.0)
         return closeness
 
-    def _observe(self, state: State, hand: Array, object_deficits: Array) -> NDArray[np.float32]:
+    def observe(self, state: State, hand: Array, object_deficits: Array) -> NDArray[np.float32]:
+        """What a policy observes, shape (n, size).
+
+        Args:
+            state: Batch of n states.
+            hand: Hands in these states, as the learner's interface has them.
+            object_deficits: See :meth:`object_deficits`.
+        """
         parts = [self.interface.robot(state, hand)]
         for slots, column, numbers in self._kinds:
             features = self.interface.objects(state, hand, column)

@@ -9,7 +9,7 @@ from functools import reduce
 from operator import or_
 
 from slap_ros.relational import AtomSpace, Predicate
-from slap_ros.shortcuts.signature import Change, Signature, context_of, instances, kinds
+from slap_ros.shortcuts.signature import Change, Signature, instances, kinds
 
 
 class SignatureMatcher:
@@ -25,12 +25,16 @@ class SignatureMatcher:
             space: Atoms of the task.
             grasping: Predicates about what is held; see :attr:`Signature.context`.
         """
-        self._signature, self._space, self._grasping = signature, space, grasping
-        ordered = sorted(signature.patterns)
-        self._adds = [instances(p, space) for p in ordered if p[0] == "+"]
-        self._deletes = [instances(p, space) for p in ordered if p[0] == "-"]
-        self.may_be_added = reduce(or_, self._adds, 0)  # for any objects, a mask
-        self._may_be_deleted = reduce(or_, self._deletes, 0)
+        self._signature, self._space = signature, space
+        adds = [instances(p, space) for p in signature.patterns if p[0] == "+"]
+        deletes = [instances(p, space) for p in signature.patterns if p[0] == "-"]
+        self.may_be_added = reduce(or_, adds, 0)  # for any objects, a mask
+        self._may_be_deleted = reduce(or_, deletes, 0)
+        self._adds_some, self._deletes_some = bool(adds), bool(deletes)
+        self._context = [
+            (_fluents(name, space), name in signature.context)
+            for name in sorted({*signature.context, *(p.name for p in grasping)})
+        ]
         kind = kinds(space)
         self._left_alone = ~space.mask(
             atom for atom in space.atoms if all(kind[o] in signature.slots for o in atom.objects)
@@ -64,7 +68,8 @@ class SignatureMatcher:
         return self._maximal(nodes, source, matching)
 
     def _may_begin(self, source: int) -> bool:
-        return context_of(source, self._grasping, self._space) == self._signature.context
+        """Whether as much is held as in training; see :func:`~.signature.context_of`."""
+        return all(bool(source & mask) == wanted for mask, wanted in self._context)
 
     def _maximal(self, nodes: Sequence[int], source: int, targets: Sequence[int]) -> list[int]:
         """The targets that are not on the way to others: the whole change was learned."""
@@ -76,14 +81,19 @@ class SignatureMatcher:
         ]
 
     def _matches(self, source: int, target: int) -> bool:
-        change = Change.between(source, target)
+        add, delete = target & ~source, source & ~target  # masks first: most pairs end here
         return (
-            not (change.add | change.delete) & self._left_alone
-            and not change.add & ~self.may_be_added
-            and bool(change.add) == bool(self._adds)
-            and bool(change.delete & self._may_be_deleted) == bool(self._deletes)
-            and self._signature.matches(change, source, self._space)
+            not (add | delete) & self._left_alone
+            and not add & ~self.may_be_added
+            and bool(add) == self._adds_some
+            and bool(delete & self._may_be_deleted) == self._deletes_some
+            and self._signature.matches(Change(add, delete), source, self._space)
         )
+
+
+def _fluents(predicate: str, space: AtomSpace) -> int:
+    """The atoms of a predicate that operators change, a mask."""
+    return space.mask(a for a in space.atoms if a.predicate.name == predicate) & ~space.static
 
 
 def _is_part(change: Change, other: Change) -> bool:

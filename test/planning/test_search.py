@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Search: the lazy one costs what the exhaustive one costs, on tasks and on made-up graphs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
-from slap_ros.planning.lazy_search import search_lazily
+from slap_ros.planning.lazy_search import SearchLimits, search_lazily
 from slap_ros.planning.model import Rollout
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.planner import make_planner
@@ -50,6 +50,7 @@ class MadeUpModel:
     """Roll-outs by table: deterministic, path-dependent, some infeasible."""
 
     space = SimpleNamespace(decode=lambda mask: (), abstract=lambda state: 0)
+    outcomes = 6  # few distinct values, so that paths meet again in equal low-level states
 
     def __init__(self):
         self.executed = 0
@@ -59,9 +60,31 @@ class MadeUpModel:
         skill = option.skill
         rng = np.random.default_rng([skill.seed, int(state.data[0]), 1 + option.attempt])
         feasible = rng.random() > 0.15
-        # Few distinct values, so that paths meet again in equal low-level states.
-        final = State(LAYOUT, [float(rng.integers(0, 6))])
+        final = State(LAYOUT, [float(rng.integers(0, self.outcomes))])
         return Rollout(bool(feasible), skill.true_cost(state) + 2 * option.attempt, final)
+
+    def raised_bound(self, option, state, target, steps):
+        return steps
+
+
+class UnmetModel(MadeUpModel):
+    """Paths never meet again, so that it does not matter which of equals comes first."""
+
+    outcomes = 10**9
+
+    def roll_out(self, option, state, target):
+        rollout = super().roll_out(option, state, target)
+        number = int(option.skill.name[1:])
+        return replace(rollout, final=State(LAYOUT, rollout.final.data + number * self.outcomes))
+
+
+class TellingModel(UnmetModel):
+    """The same roll-outs, of which one step more is known each time that somebody asks."""
+
+    def raised_bound(self, option, state, target, steps):
+        rollout = super().roll_out(option, state, target)
+        most = rollout.steps if rollout.reached else 30
+        return min(steps + 1, max(steps, most))
 
 
 def in_ways(skill, count, attempt=0):
@@ -102,6 +125,17 @@ def cost_or_none(search, graph):
 @given(made_up_graphs())
 def test_lazy_and_exhaustive_agree_on_made_up_graphs(graph):
     assert cost_or_none(search_lazily, graph) == cost_or_none(search_exhaustively, graph)
+
+
+@settings(max_examples=400, deadline=None)
+@given(made_up_graphs(), st.sampled_from([1.0, 3.0, 30.0]))
+def test_bounds_that_rise_bit_by_bit_lead_to_the_same_plan(graph, weight):
+    limits = SearchLimits(weight)
+    plans = [
+        search_lazily(graph, State(LAYOUT, [0.0]), model, limits).plan
+        for model in (UnmetModel(), TellingModel())
+    ]
+    assert plans[0] == plans[1]
 
 
 @dataclass(frozen=True)

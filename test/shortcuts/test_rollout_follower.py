@@ -44,6 +44,18 @@ def attempt(option, start):
     return ground.rollouts.successes(ground.shortcut, ground.encoder, start)[option.attempt]
 
 
+def test_what_is_foreseen_is_what_the_model_does(shortcut_of_plan):
+    shortcut, start = shortcut_of_plan
+    follow = shortcut.skill.start(start, shortcut.objects)
+    world, state = DOMAIN.make_world(start), start
+    for _ in attempt(shortcut, start).actions:
+        state = world.step(follow(state))
+        assert follow.foreseen == state
+    follow = shortcut.skill.start(start, shortcut.objects)
+    follow(moved(start, "block", 1e-7))  # as predicted, but not to the bit
+    assert follow.foreseen is None
+
+
 def test_the_rollout_is_followed_where_objects_are_a_little_elsewhere(shortcut_of_plan):
     shortcut, start = shortcut_of_plan
     follow = shortcut.skill.start(start, shortcut.objects)

@@ -14,13 +14,21 @@ from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.sampling import DEFAULT, Sampling
+from slap_ros.shortcuts.shooting import RandomActions
 from slap_ros.shortcuts.shortcut_library import load_library
-from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
+from slap_ros.shortcuts.shortcut_rollouts import MAX_NET_FAILURES, ShortcutRollouts
 from slap_ros.shortcuts.signature import Change
 
 DOMAIN = get_domain("obstacle2d")
 (SHORTCUT,) = load_library(Path(__file__).parent / "data" / "obstacle2d", DOMAIN).shortcuts
 SAMPLING = Sampling(samples=4, batch=8)
+
+
+class NothingDone(RandomActions):
+    """A policy that stands still, with noise as well."""
+
+    def sampler(self, rng, temperature=1.0):
+        return lambda step, observations: self.mean(observations)
 
 
 def situations(count=6):
@@ -51,10 +59,45 @@ def test_each_rollout_does_in_a_world_of_its_own_what_it_says():
             for action, predicted in zip(rollout.actions, rollout.states, strict=True):
                 assert np.array_equal(world.state.data, predicted.data)
                 world.step(encoder.action_map(action.astype(np.float64)))
+            assert np.array_equal(world.state.data, rollout.final.data)
             goal = encoder.change.apply(encoder.space.abstract(state))
             assert encoder.space.abstract(world.state) == goal
             seen += 1
     assert seen > 6
+
+
+def same(one, other):
+    """Whether successes are the same to the bit."""
+    pairs = list(zip(one, other, strict=True))
+    return all(
+        [s.key for s in (*a.states, a.final)] == [s.key for s in (*b.states, b.final)]
+        for a, b in pairs
+    )
+
+
+def test_what_is_tried_bit_by_bit_ends_as_what_is_tried_at_once():
+    """States take turns, and each is asked about more and more steps."""
+    every = list(situations(4))
+    whole = [successes(DOMAIN, SAMPLING, encoder, state) for encoder, state in every]
+    rollouts = ShortcutRollouts(DOMAIN, every[0][1], SAMPLING)
+    raised = 0
+    for steps in range(1, 6):
+        for encoder, state in every:
+            raised += rollouts.raised_bound(SHORTCUT, encoder, state, steps) - steps
+    assert raised > 4
+    for (encoder, state), found in zip(every, whole, strict=True):
+        assert same(rollouts.successes(SHORTCUT, encoder, state), found)
+    assert any(whole)
+
+
+def test_what_was_begun_counts_among_failures_where_that_decides():
+    """A policy that does nothing fails wherever it is tried."""
+    rollouts = ShortcutRollouts(DOMAIN, next(situations(1))[1], SAMPLING)
+    still = replace(SHORTCUT, policy=NothingDone(2))
+    for number, (encoder, state) in enumerate(situations(MAX_NET_FAILURES)):
+        assert not rollouts.given_up(still), number
+        assert rollouts.raised_bound(still, encoder, state, 1) == 2
+    assert rollouts.given_up(still)
 
 
 def test_a_rollout_that_is_kept_keeps_no_other():
@@ -78,9 +121,9 @@ def test_a_shortcut_is_tried_as_often_as_the_results_say():
     begun = []
 
     class Counted(Obstacle2DVectorWorld):
-        def reset(self, world, state):
-            begun.append(world)
-            super().reset(world, state)
+        def __init__(self, states, **settings):
+            begun.extend(states)
+            super().__init__(states, **settings)
 
     counting = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=Counted))
     encoder, state = next(situations())

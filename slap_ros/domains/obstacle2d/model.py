@@ -5,14 +5,15 @@
 from __future__ import annotations
 
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slap_ros.domains.classifiers import always, is_held, strictly
 from slap_ros.relational import (
     Column,
     Feature,
-    Layout,
     LiftedAtom,
     LiftedOperator,
     Predicate,
@@ -20,7 +21,7 @@ from slap_ros.relational import (
     Type,
     Variable,
 )
-from slap_ros.relational.predicates import Bools
+from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
 
 BLOCK_SIZE = 0.2  # m, width and height of every block and of the robot's gripper
@@ -47,13 +48,6 @@ def _is_not_target(state: State, surface: Column) -> Bools:
     return state.stack(surface, "is_target") < 0.5
 
 
-def _reach(state: State, block: Column, surface: Column) -> Array:
-    """How far the block reaches over the surface in x; negative: the gap between them."""
-    distance = np.abs(state.stack(block, "x") - state.stack(surface, "x"))
-    reach: Array = (BLOCK_SIZE + state.stack(surface, "width")) / 2 - distance
-    return reach
-
-
 def _rest_margin(state: State, block: Column) -> Array:
     """Positive where the block lies on the table: not held, bottom at the table's top.
 
@@ -64,20 +58,43 @@ def _rest_margin(state: State, block: Column) -> Array:
     return np.maximum(margin, STEEPNESS * margin)
 
 
-def _target_reach(state: State, block: Column, surface: Column) -> Array:
+class _Relations(NamedTuple):
+    """Of each block to each surface; predicates share most of the work."""
+
+    rest: Array  # margin of lying on the table, m, shape (..., blocks)
+    distance: Array  # between middles, m, shape (..., blocks, surfaces)
+    overlap: Array  # margin, m, shape (..., blocks, surfaces); -1 or less where that is no target
+    on_table: Array  # margin of being at rest and off every target area, m, shape (..., blocks)
+
+
+@cache_latest
+def _relations(state: State) -> _Relations:
     """Only target areas can be overlapped; the table is simply what blocks lie on."""
-    reach = _reach(state, block, surface) - OVERLAP_TOLERANCE
-    return np.where(_is_target(state, surface), reach, -1.0)
+    blocks, surfaces = state.layout.column_of(BLOCK), state.layout.column_of(SURFACE)
+    rest = _rest_margin(state, blocks)
+    places, middles = state.stack(blocks, "x")[..., None], state.stack(surfaces, "x")
+    distance = np.abs(places - middles[..., None, :])
+    half_widths = (BLOCK_SIZE + state.stack(surfaces, "width")) / 2
+    reach = half_widths[..., None, :] - distance - OVERLAP_TOLERANCE
+    reach = np.where(_is_target(state, surfaces)[..., None, :], reach, -1.0)
+    overlap = np.minimum(rest[..., None], reach)
+    off_targets = strictly(-np.minimum(rest, reach.max(axis=-1)))
+    return _Relations(rest, distance, overlap, np.minimum(rest, off_targets))
+
+
+def _numbers(state: State, column: Column, kind: Type) -> NDArray[np.intp]:
+    """At which places among the objects of a type those of a column are."""
+    cached = column.cached_indices(state.layout)
+    if kind not in cached:
+        every = state.layout.column_of(kind).objects
+        cached[kind] = np.array([every.index(obj) for obj in column.objects], dtype=np.intp)
+    return cached[kind]
 
 
 def _overlap_margin(state: State, block: Column, surface: Column) -> Array:
-    return np.minimum(_rest_margin(state, block), _target_reach(state, block, surface))
-
-
-def _inside_margin(tolerance: float, state: State, block: Column, surface: Column) -> Array:
-    distance = np.abs(state.stack(block, "x") - state.stack(surface, "x"))
-    room = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + tolerance
-    return _both(_rest_margin(state, block), room - distance)
+    of_blocks, of_surfaces = _numbers(state, block, BLOCK), _numbers(state, surface, SURFACE)
+    margin: Array = _relations(state).overlap[..., of_blocks, of_surfaces]
+    return margin
 
 
 def _both(one: Array, other: Array) -> Array:
@@ -86,33 +103,24 @@ def _both(one: Array, other: Array) -> Array:
     return np.where(missing < 0.0, missing, np.minimum(one, other))
 
 
-def _each(state: State, kind: Type) -> list[Column]:
-    return _columns_of(state.layout, kind)
-
-
-@lru_cache(maxsize=256)
-def _columns_of(layout: Layout, kind: Type) -> list[Column]:
-    return [Column((obj,)) for obj in layout.of_type(kind)]
-
-
 def _on_margin(tolerance: float, state: State, block: Column, surface: Column) -> Array:
     """On a target area: inside it. On the table: at rest and off every target area."""
-    reaches = [_target_reach(state, block, other) for other in _each(state, SURFACE)]
-    rest = _rest_margin(state, block)
-    off_targets = strictly(-np.minimum(rest, np.max(reaches, axis=0)))
-    on_table = np.minimum(rest, off_targets)
-    inside = _inside_margin(tolerance, state, block, surface)
-    return np.where(_is_target(state, surface), inside, on_table)
+    known = _relations(state)
+    of_blocks, of_surfaces = _numbers(state, block, BLOCK), _numbers(state, surface, SURFACE)
+    room = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + tolerance
+    distance = known.distance[..., of_blocks, of_surfaces]
+    inside = _both(known.rest[..., of_blocks], room - distance)
+    return np.where(_is_target(state, surface), inside, known.on_table[..., of_blocks])
 
 
 def _clear_margin(state: State, surface: Column) -> Array:
-    overlaps = [_overlap_margin(state, block, surface) for block in _each(state, BLOCK)]
-    return strictly(-np.max(overlaps, axis=0))
+    most = _relations(state).overlap.max(axis=-2)
+    return strictly(-most[..., _numbers(state, surface, SURFACE)])
 
 
 def _gripper_empty(state: State, _: Column) -> Bools:
-    held = [state.stack(block, "held") for block in _each(state, BLOCK)]
-    empty: Bools = np.max(held, axis=0) < 0.5
+    held = state.stack(state.layout.column_of(BLOCK), "held")
+    empty: Bools = held.max(axis=-1, keepdims=True) < 0.5
     return empty
 
 

@@ -138,7 +138,9 @@ class Sweep:
     def stays_clear(self, boxes: Sequence[OrientedBox]) -> bool:
         """Whether no link comes near any of the boxes, which stand still."""
         around = [(box, box.radius) for box in boxes]
-        return not any(self._comes_near(link, around) for link in range(len(self.travel)))
+        # The hand, and what it holds, come last and touch first.
+        links = range(len(self.travel) - 1, -1, -1)
+        return not any(self._comes_near(link, around) for link in links)
 
     def _comes_near(self, link: int, around: Sequence[tuple[OrientedBox, float]]) -> bool:
         """Whether a link comes near a box; mostly, the ball around the box already excludes it."""
@@ -155,7 +157,8 @@ class Sweep:
         """Whether the box around a link comes near another anywhere on its way."""
         samples = math.ceil(self.travel[link] / FINE) or 1
         around = box.grown(CLEARANCE + 0.5 * self.travel[link] / samples)
-        return any(around.overlaps(self._at(link, k / samples)) for k in range(samples + 1))
+        from_end = range(samples, -1, -1)  # where it mostly is when it touches
+        return any(around.overlaps(self._at(link, k / samples)) for k in from_end)
 
     def hits(self, obstacles: Sequence[Obstacle]) -> bool:
         """Whether the arm enters an obstacle deeper than it may, at the end of its way.
