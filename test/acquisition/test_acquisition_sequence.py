@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from slap_ros.acquisition.curriculum import jobs
+from slap_ros.acquisition.training.continued_training import earlier_starts
 from slap_ros.acquisition.training.skill_training import rounds_in
 from slap_ros.api import acquisition_sequence
 from slap_ros.api.acquisition import AcquisitionWatch, UnwatchedCurriculum, acquirable
@@ -108,6 +109,9 @@ def test_a_sequence_interrupted_within_its_goals_ends_as_one_that_was_not(tmp_pa
     )
     assert second[: len(first)] == first
     assert len(second) > len(first)  # its training went on
+    earlier = tmp_path / "whole" / "library-training" / "0-train" / "training" / "Pick"
+    rehearsed = earlier_starts(earlier, POINTS.types_by_name, 3)
+    assert len(rehearsed) == len({start.state.data.tobytes() for start in rehearsed}) == 2  # tasks
 
 
 def files(folder):

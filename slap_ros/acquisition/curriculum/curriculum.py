@@ -377,14 +377,19 @@ class Curriculum:
         return folder
 
     def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
-        """What policies that see nothing are worth in each skill's place; None where untried."""
+        """What policies that see nothing are worth in each skill's place; None where untried.
+
+        That is the operator's, and known already where a training goes on.
+        """
+        going_on = self.continued.keys() & self._kept.keys()
+        known = {name: self._kept[name].record.get("vacuity") for name in going_on}
         starts = {name: InitiationStates.of(name, fresh).all for name in names}
-        begun = [name for name in names if starts[name]]
+        begun = [name for name in names if starts[name] and name not in known]
         work = [(self.source, name, starts[name], self.settings.judged) for name in begun]
         found = self._results.vacuity(
             partial(self._run, "trying constant actions", jobs.vacuity, work)
         )
-        return dict.fromkeys(names) | dict(zip(begun, found, strict=True))
+        return dict.fromkeys(names) | known | dict(zip(begun, found, strict=True))
 
     # -- plumbing ---------------------------------------------------------------------------------
 

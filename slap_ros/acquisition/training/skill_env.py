@@ -219,12 +219,16 @@ class SkillVecEnv:
             number: Number of these worlds among those over the same objects, from 0.
         """
         key = states[0].layout, number
-        if key not in self._made:
-            self._made[key] = self._make_worlds(states)
-            return self._made[key]
-        for i, state in enumerate(states):
-            self._made[key].reset(i, state)
-        return self._made[key]
+        worlds = self._made.pop(key, None)
+        if worlds is None:
+            worlds = self._make_worlds(states)
+        else:
+            for i, state in enumerate(states):
+                worlds.reset(i, state)
+        self._made[key] = worlds  # last
+        if len(self._made) > 2 * self.num_envs:  # simulations take tens of megabytes each
+            del self._made[next(iter(self._made))]
+        return worlds
 
 
 Drawn = list[tuple[Indices, list[Initiation]]]  # environments, and the states that they begin in
