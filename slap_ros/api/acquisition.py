@@ -201,9 +201,8 @@ def carry_out(
                 settings: AcquisitionSettings,
                 kept: Mapping[str, AcquiredSkill],
             ) -> SkillLibrary:
-                source = _source(request, proposal)
                 return Curriculum(
-                    source,
+                    _source(request, proposal),
                     settings,
                     folder,
                     workers,
@@ -212,6 +211,7 @@ def carry_out(
                     encoder,
                     dict(kept),
                     shortcuts,
+                    request.continued,
                 ).run()
 
             library = learn(proposal, request.work_folder, settings, kept)

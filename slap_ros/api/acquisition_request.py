@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -54,6 +54,8 @@ class AcquisitionRequest:
             shortcuts have led are learned from there.
         proposal_of: Work folder of an earlier acquisition whose operators and rewards are used
             again; None to have some proposed.
+        continued: Folders of the trainings of skills of ``keep``, by operator. Where these skills
+            are learned further, their trainings go on, with their critics and replay buffers.
 
     Raises:
         InvalidParameterError: They do not fit together.
@@ -75,6 +77,7 @@ class AcquisitionRequest:
     revise: bool = False
     shortcuts: Path | None = None
     proposal_of: Path | None = None
+    continued: Mapping[str, Path] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_known("--rewarder", self.rewarder, REWARDERS)

@@ -3,11 +3,18 @@
 """One task after another, with one library that grows: continual learning (LG-SAIL §5, Fig. 5).
 
 Each goal of a sequence is an acquisition of its own, which keeps the library of the goal before it:
-skills that carry out the new goal are used as they are, and learned further where they fail. After
-each, all goals so far are tried, so that what was forgotten shows. A folder has::
+skills that carry out the new goal are used as they are, and learned further where they fail: their
+trainings go on, with critics, replay buffers and some of the states of earlier goals. A goal is
+over once three judgements in a row had .8 of its tasks solved, unless the setting ``solved`` says
+otherwise. After each, all goals so far are tried, so that what was forgotten shows. A work folder
+has::
 
     0-task0/library, 0-task0/training    the library after the first goal, and its work folder
     0-task0/tried.json                   what comes of plans for all goals so far with that library
+    0-task0/.tried.jsonl                 the same for each goal, while others are being tried
+
+Interrupted at any time, the same sequence goes on from there. After each goal, its library is also
+that of the whole sequence so far.
 """
 
 from __future__ import annotations
@@ -20,24 +27,30 @@ from statistics import fmean
 from typing import Any
 
 from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback
+from slap_ros.acquisition.curriculum.curriculum_folder import CurriculumFolder
 from slap_ros.acquisition.curriculum.jobs import horizon_of
 from slap_ros.acquisition.curriculum.rollouts import roll_out
+from slap_ros.acquisition.curriculum.solved_shares import Point
+from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.acquisition.training.skill_training import ENOUGH_IN_A_ROW
 from slap_ros.api.acquisition import AcquisitionWatch, carry_out
 from slap_ros.api.acquisition_request import AcquisitionRequest
-from slap_ros.api.learning_curves import PLAN, CurveCallback, Point, steps_to
-from slap_ros.core import Domain
+from slap_ros.api.jobs import some_workers
+from slap_ros.api.learning_curves import PLAN, CurveCallback, steps_to
 from slap_ros.core.goals import task_with_goal
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
+from slap_ros.learning.setting_changes import parse_changes
 from slap_ros.learning.work_folder import WorkFolder
-from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.learning.workers import run_in_order
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.skills.skill import LearnedSkill
 from slap_ros.skills.skill_library import SkillLibrary, save_skill_library
 
 SEQUENCE_SEED = 400  # seed of the tasks that goals are tried in; training and studies use others
 LEVEL = 0.8  # share of tasks that are solved up to which steps are counted, as in the paper
-IN_A_ROW = 3  # judgements in a row that must have it
 
-_Tries = Mapping[str, Sequence[float]]  # task progress of each task, by goal
+_Tries = Mapping[str, list[float]]  # task progress of each task, by goal
 
 
 @dataclass(frozen=True)
@@ -46,7 +59,8 @@ class SequenceRequest:
 
     Args:
         acquisition: Request for the acquisitions, whose goal and library to keep do not count; its
-            folders are those of the whole sequence.
+            folders are those of the whole sequence. A goal is done at ``LEVEL`` where its changes
+            do not say at which share of ``solved`` tasks.
         goals: Names of the goals, or atoms, in their order; two at least.
         scratch: Whether every goal is learned from scratch, for comparison.
         tasks: Number of tasks per goal in which all goals so far are tried after each.
@@ -70,6 +84,35 @@ class SequenceRequest:
         if len(set(self.goals)) < len(self.goals):
             raise InvalidParameterError("a goal stands twice in the sequence; leave one out")
 
+    def acquisition_of(self, number: int) -> AcquisitionRequest:
+        """The request for the acquisition of a goal.
+
+        Args:
+            number: Number of the goal, from 0.
+
+        Raises:
+            InvalidParameterError: The settings cannot be changed so.
+        """
+        base, folder = self.acquisition, self.folder(number)
+        given = parse_changes(base.changes, AcquisitionSettings)
+        done = () if "solved" in given else (f"solved={LEVEL}",)
+        return replace(
+            base,
+            goal=self.goals[number],
+            changes=(*done, *base.changes),
+            keep=self.folder(number - 1) / "library" if number and not self.scratch else None,
+            library_folder=folder / "library",
+            work_folder=folder / "training",
+        )
+
+    def folder(self, number: int) -> Path:
+        """The folder of a goal.
+
+        Args:
+            number: Number of the goal, from 0.
+        """
+        return self.acquisition.work_folder / f"{number}-{_file_name(self.goals[number])}"
+
 
 @dataclass(frozen=True)
 class KnownStart:
@@ -91,8 +134,9 @@ class SequenceStep:
     Args:
         goal: Name of the goal, or its atoms.
         steps: Environment steps learned for it, all skills together.
-        steps_to_level: Environment steps after which ``IN_A_ROW`` judgements in a row first had
-            ``LEVEL`` of the tasks solved; see :class:`~slap_ros.api.learning_curves.SolvedShares`.
+        steps_to_level: Environment steps after which ``ENOUGH_IN_A_ROW`` judgements in a row first
+            had ``LEVEL`` of the tasks solved; see
+            :class:`~slap_ros.acquisition.curriculum.solved_shares.SolvedShares`.
         reached: Whether they ever had; else ``steps_to_level`` are all steps.
         learned: Environment steps of each skill that was learned further, by operator.
         retrieved: Known skill that each of these began with, and its success before, by operator.
@@ -146,7 +190,7 @@ def acquire_sequence(
     watch: AcquisitionWatch,
     on_goal: Callable[[int, str], None] = lambda *_: None,
 ) -> list[SequenceStep]:
-    """Acquire skills for one goal after another, and save the last library.
+    """Acquire skills for one goal after another, and save the library after each.
 
     Interrupted, it continues where it was when it is called with the same arguments.
 
@@ -169,40 +213,54 @@ def acquire_sequence(
     steps: list[SequenceStep] = []
     library = SkillLibrary(base.domain.name)
     known: _Tries = {}
+    trainings: dict[str, Path] = {}
     for number, goal in enumerate(request.goals):
         on_goal(number, goal)
-        folder = base.work_folder / f"{number}-{_file_name(goal)}"
-        acquisition = replace(
-            base,
-            goal=goal,
-            keep=_library_of(request, number - 1) if steps and not request.scratch else None,
-            library_folder=folder / "library",
-            work_folder=folder / "training",
-        )
         before = library if not request.scratch else SkillLibrary(base.domain.name)
+        acquisition = replace(request.acquisition_of(number), continued=dict(trainings))
         library, measured = _one_goal(acquisition, jobs, ray, watch)
-        known = _tried(request, number, folder, known if library.digest == before.digest else {})
+        if not request.scratch:
+            trainings |= _trainings_of(acquisition, before, library)
+        known = known if library.digest == before.digest else {}
+        known = _tried(request, number, known, jobs, watch)
         steps.append(_step(goal, before, library.record, measured, known))
-    sequence = {"scratch": request.scratch, "goals": [step.as_json() for step in steps]}
-    record = {**library.record, "sequence": sequence}
-    save_skill_library(base.library_folder, replace(library, record=record))
+        sequence = {
+            "scratch": request.scratch,
+            "goals": [step.as_json() for step in steps],
+            "to_come": list(request.goals[number + 1 :]),
+        }
+        record = {**library.record, "sequence": sequence}
+        save_skill_library(base.library_folder, replace(library, record=record))
     return steps
+
+
+def _trainings_of(
+    acquisition: AcquisitionRequest, before: SkillLibrary, library: SkillLibrary
+) -> dict[str, Path]:
+    """The folders in which an acquisition learned skills that are in its library, by operator.
+
+    Args:
+        acquisition: Request for the acquisition.
+        before: Library that was kept.
+        library: Library of the acquisition.
+    """
+    work = CurriculumFolder(acquisition.work_folder)
+    kept = {SkillLibrary(before.domain, (skill,)).digest for skill in before.skills}
+    return {
+        skill.operator.name: work.training(skill.operator.name, skill.record["attempts"] - 1)
+        for skill in library.skills
+        if SkillLibrary(library.domain, (skill,)).digest not in kept
+    }
 
 
 def _described(request: SequenceRequest) -> dict[str, Any]:
     """All that the results depend on, as JSON."""
     return {
-        "acquisition": replace(request.acquisition, goal=None, keep=None).command,
+        "acquisition": replace(request.acquisition_of(0), goal=None, keep=None).command,
         "goals": list(request.goals),
         "scratch": request.scratch,
         "tasks": request.tasks,
     }
-
-
-def _library_of(request: SequenceRequest, number: int) -> Path:
-    """The folder of the library after a goal."""
-    name = f"{number}-{_file_name(request.goals[number])}"
-    return request.acquisition.work_folder / name / "library"
 
 
 def _step(
@@ -223,7 +281,7 @@ def _step(
     """
     solved = {name: fmean(one == 1.0 for one in tasks) for name, tasks in tries.items()}
     judged = [*measured.solved.points, Point(record["steps"], solved[goal])]
-    steps, reached = steps_to(judged, LEVEL, IN_A_ROW)
+    steps, reached = steps_to(judged, LEVEL, ENOUGH_IN_A_ROW)
     known = {skill.operator.name: skill.folder_name for skill in before.skills}
     learned = {name: points for name, points in measured.curves.items() if name != PLAN}
     return SequenceStep(
@@ -261,33 +319,46 @@ def _one_goal(
 
 
 def _tried(
-    request: SequenceRequest, number: int, folder: Path, known: _Tries
+    request: SequenceRequest, number: int, known: _Tries, jobs: int | None, watch: AcquisitionWatch
 ) -> dict[str, list[float]]:
     """What comes of the tasks of all goals up to one, with the library after it.
 
     Args:
         request: Request of the sequence.
         number: Number of the goal.
-        folder: Folder of the goal, where it is read if it is there already.
         known: What came of goals before with the same library, which would be the same again.
+        jobs: Number of processes; None for this one.
+        watch: Functions that are called.
     """
+    base, folder, goals = request.acquisition.domain, request.folder(number), request.goals
+    so_far = goals[: number + 1]
 
-    def try_goals() -> dict[str, list[float]]:
-        base = request.acquisition.domain
-        domain = open_domain(DomainChoice(base.name, base.preset, str(folder / "library")))
-        return {
-            goal: list(known[goal]) if goal in known else _progress(domain, goal, request.tasks)
-            for goal in request.goals[: number + 1]
-        }
+    def try_goals(finished: FinishedJobs) -> dict[str, list[float]]:
+        choice = DomainChoice(base.name, base.preset, str(folder / "library"))
+        new = [goal for goal in so_far if goal not in known]
+        work = [(choice, goal, request.tasks) for goal in new]
+        with some_workers(jobs) as workers, watch.curriculum() as callback:
+            found = run_in_order(workers, try_goal, work, "trying all goals", callback, finished)
+        return {**known, **dict(zip(new, found, strict=True))}
 
     def read(data: Any) -> dict[str, list[float]]:
-        return {goal: list(map(float, data[goal])) for goal in request.goals[: number + 1]}
+        return {goal: list(map(float, data[goal])) for goal in so_far}
 
-    return WorkFolder(folder).cached("tried", try_goals, read)
+    return cached_jobs(WorkFolder(folder), "tried", try_goals, read)
 
 
-def _progress(domain: Domain, goal: str, tasks: int) -> list[float]:
-    """The task progress of each task."""
+def try_goal(choice: DomainChoice, goal: str, tasks: int) -> list[float]:
+    """Carry out plans for tasks of a goal.
+
+    Args:
+        choice: Domain with the library whose skills are tried.
+        goal: Name of the goal, or its atoms.
+        tasks: Number of tasks.
+
+    Returns:
+        The task progress of each task.
+    """
+    domain = choice.make()
     skills = {n: skill for n, skill in domain.skills.items() if isinstance(skill, LearnedSkill)}
     rollouts = [
         roll_out(

@@ -98,6 +98,9 @@ class SequenceOptions:
 def acquire_sequence_command(options: SequenceOptions) -> int:
     """Acquire skills for one goal after another, with one library that grows.
 
+    A goal is done once three judgements in a row had .8 of its tasks solved (--set solved=0.8).
+    With --set solved=1, a goal goes on until nothing fails, or its --steps are spent.
+
     After an interruption, the same command goes on where it stopped.
     """
     domain = acquirable(options.domain, options.preset)

@@ -56,6 +56,7 @@ RANGES: Mapping[str, tuple[float, float]] = {  # least and greatest value; all o
     "progress": (0.0, 1.0),
     "random_goals": (0.0, 1.0),
     "rehearsal": (0.0, BELOW_1),
+    "solved": (0.0, 1.0),
     "scale": (math.ulp(0.0), sys.float_info.max),
     "spread": (0.0, sys.float_info.max),
     "tau": (math.ulp(0.0), 1.0),

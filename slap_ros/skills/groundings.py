@@ -109,6 +109,14 @@ class Groundings:
             for (layout, _), numbers in members.items()
         )
 
+    @cached_property
+    def _kind_of_each(self) -> Indices:
+        """The index of the kind of each grounding."""
+        kinds = np.empty(len(self.groundings), dtype=np.intp)
+        for i, kind in enumerate(self._kinds):
+            kinds[kind.numbers] = i
+        return kinds
+
     def rows(self, states: Array) -> Array:
         """States of one layout, shape (n, size), padded to shape (n, width)."""
         missing = self.width - states.shape[-1]
@@ -124,10 +132,9 @@ class Groundings:
         Yields:
             The parts; together they have every row once.
         """
-        for kind in self._kinds:
-            choice = np.searchsorted(kind.numbers, numbers)
-            choice = np.minimum(choice, len(kind.numbers) - 1)
-            where = np.flatnonzero(kind.numbers[choice] == numbers)
-            if where.size:
-                state = State(kind.layout, rows[where, : kind.layout.size])
-                yield GroundedStates(where, state, kind.columns, choice[where])
+        kinds = self._kind_of_each[numbers]
+        for i in np.unique(kinds):
+            kind, where = self._kinds[i], np.flatnonzero(kinds == i)
+            state = State(kind.layout, rows[where, : kind.layout.size])
+            choice = np.searchsorted(kind.numbers, numbers[where])
+            yield GroundedStates(where, state, kind.columns, choice)

@@ -3,12 +3,17 @@
 """One goal after another: what is known is kept and used, and what was forgotten would show."""
 
 import json
+from contextlib import nullcontext, suppress
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
 
 from slap_ros.acquisition.curriculum import jobs
-from slap_ros.api.acquisition import AcquisitionWatch, acquirable
+from slap_ros.acquisition.training.continued_training import earlier_starts
+from slap_ros.acquisition.training.skill_training import rounds_in
+from slap_ros.api import acquisition_sequence
+from slap_ros.api.acquisition import AcquisitionWatch, UnwatchedCurriculum, acquirable
 from slap_ros.api.acquisition_request import AcquisitionRequest
 from slap_ros.api.acquisition_sequence import SequenceRequest, acquire_sequence
 from slap_ros.cli import app
@@ -49,7 +54,7 @@ def test_a_second_goal_is_learned_with_the_skills_of_the_first(tmp_path, monkeyp
     assert first["retrieved"] == {}
     assert set(second["retrieved"]) == set(second["learned"])
     record = json.loads((tmp_path / "library" / "library.json").read_text())
-    assert record["sequence"] == {"scratch": False, "goals": steps}
+    assert record["sequence"] == {"scratch": False, "goals": steps, "to_come": []}
     monkeypatch.setattr(jobs, "learn", None)  # nothing is learned when it is asked for again
     assert json.loads(sequence(*asked).stdout) == json.loads(ran.stdout)
     other = sequence(*asked, "--scratch")
@@ -63,23 +68,84 @@ TINY = (
 )  # fmt: skip
 
 
+class Interrupted(UnwatchedCurriculum):
+    """Interrupts each step of an acquisition once, after its first job: judging, trying, learning.
+
+    Args:
+        before: Names of the steps that were interrupted before.
+    """
+
+    def __init__(self, before):
+        self.before = before
+
+    def on_progress(self, what, done, total):
+        if done and (what, total) not in self.before:
+            self.before.add((what, total))
+            raise KeyboardInterrupt
+
+
 @pytest.mark.training
-def test_an_interrupted_sequence_ends_as_one_that_was_not(tmp_path):
-    """Goal by goal it says where it is, and what it found is the same to the bit."""
-    begun = []
+def test_a_sequence_interrupted_within_its_goals_ends_as_one_that_was_not(tmp_path, monkeypatch):
+    """Whatever had ended is not done again, and all files are the same to the byte."""
+    whole = acquire_sequence(tiny(tmp_path / "whole" / "library"), None, None, UNWATCHED)
+    tried, interrupted = [], set()
+    original = acquisition_sequence.try_goal
+    monkeypatch.setattr(
+        acquisition_sequence, "try_goal", lambda *given: (tried.append(given), original(*given))[1]
+    )
+    watch = replace(UNWATCHED, curriculum=lambda: nullcontext(Interrupted(interrupted)))
+    steps = None
+    while steps is None:
+        with suppress(KeyboardInterrupt):
+            steps = acquire_sequence(tiny(tmp_path / "cut" / "library"), None, None, watch)
+    assert steps == whole
+    names = {what for what, _ in interrupted}
+    assert {"carrying out plans", "learning skills", "trying all goals"} <= names
+    assert [goal for _, goal, _ in tried] == ["train", "swapped"]  # the skills stay as they are
+    assert files(tmp_path / "cut") == files(tmp_path / "whole")
+    first, second = (
+        rounds_in(tmp_path / "whole" / "library-training" / goal / "training" / "Pick")
+        for goal in ("0-train", "1-swapped")
+    )
+    assert second[: len(first)] == first
+    assert len(second) > len(first)  # its training went on
+    earlier = tmp_path / "whole" / "library-training" / "0-train" / "training" / "Pick"
+    rehearsed = earlier_starts(earlier, POINTS.types_by_name, 3)
+    assert len(rehearsed) == len({start.state.data.tobytes() for start in rehearsed}) == 2  # tasks
+
+
+def files(folder):
+    """What is kept, by name, but for checkpoints, which have more than what follows from them."""
+    paths = [path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pt"]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+
+@pytest.mark.training
+def test_each_goal_leaves_a_library_of_the_sequence_so_far(tmp_path):
+    """So what is known of a sequence can be used before its end."""
+    folder, begun = tmp_path / "library", []
 
     def stop(number, goal):
         begun.append((number, goal))
-        if number == 1 and len(begun) == 2:
+        if number == 1:
             raise KeyboardInterrupt
 
-    whole = acquire_sequence(tiny(tmp_path / "whole"), None, None, UNWATCHED)
     with pytest.raises(KeyboardInterrupt):
-        acquire_sequence(tiny(tmp_path / "cut"), None, None, UNWATCHED, stop)
-    assert acquire_sequence(tiny(tmp_path / "cut"), None, None, UNWATCHED, stop) == whole
-    assert begun == [(0, "train"), (1, "swapped")] * 2
-    found = [load_skill_library(tmp_path / name, POINTS).digest for name in ("whole", "cut")]
-    assert found[0] == found[1]
+        acquire_sequence(tiny(folder), None, None, UNWATCHED, stop)
+    assert begun == [(0, "train"), (1, "swapped")]
+    sequence = load_skill_library(folder, POINTS).record["sequence"]
+    assert [step["goal"] for step in sequence["goals"]] == ["train"]
+    assert sequence["to_come"] == ["swapped"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "solved"), [(("patience=3",), 0.8), (("solved=0.9", "patience=3"), 0.9)]
+)
+def test_a_goal_is_done_at_the_papers_share_unless_it_is_said_otherwise(tmp_path, changes, solved):
+    asked = tiny(tmp_path)
+    asked = replace(asked, acquisition=replace(asked.acquisition, changes=changes))
+    settings = asked.acquisition_of(1).chosen_settings()
+    assert (settings.solved, settings.patience) == (solved, 3)
 
 
 def tiny(folder):

@@ -54,6 +54,14 @@ def test_a_round_is_the_same_whoever_judges_it(tmp_path, enough, segments):
     assert not active_children()
 
 
+@pytest.mark.training
+def test_three_judgements_that_are_as_good_as_the_goal_needs_end_a_round(tmp_path):
+    """The first of them is made before anything is learned."""
+    unreachable = replace(SETTINGS, enough=2.0)
+    learned = jobs.learn(replace(job(tmp_path, unreachable), needed=0.0))
+    assert len(learned["segments"]) == 2
+
+
 @pytest.mark.slow
 @pytest.mark.training
 def test_the_next_segment_is_learned_before_the_verdict(tmp_path, monkeypatch):

@@ -225,6 +225,33 @@ def test_drawing_starts_can_be_resumed_at_any_round():
         assert np.array_equal(resumed._numbers, numbers)
 
 
+def varied_env(first_round=0):
+    """Five states, each of other objects, and two environments."""
+    states = [sample_task(np.random.default_rng(i), 2 + i).initial_state for i in range(5)]
+    begun = [Initiation(state, (state.layout.by_name["thing0"],)) for state in states]
+    groundings = Groundings([one.grounding for one in begun])
+    mdp = SkillMdp(POINTS, SkillReward(PICK, REWARDS["Pick"], INTERFACE), groundings)
+    return SkillVecEnv(mdp, begun, 2, HORIZON, (3,), first_round), begun
+
+
+def test_with_more_kinds_of_scenes_than_environments_episodes_begin_in_all():
+    """And they are the same where training was resumed, and in worlds that were used before."""
+    env, begun = varied_env()
+    for number in range(12):
+        assert np.array_equal(varied_env(number)[0]._rows, env._rows)
+        for _ in range(HORIZON):
+            env.step(np.full((2, 3), 0.5))
+    episodes = env.take_episodes()
+    assert set(episodes.numbers) == set(range(len(begun)))
+    fresh = varied_env(11)[0]
+    for _ in range(HORIZON):
+        fresh.step(np.full((2, 3), 0.5))
+    assert np.array_equal(fresh.take_episodes().states, episodes.states[-2:])
+    for number, states in zip(episodes.numbers, episodes.states, strict=True):
+        start = begun[number].state.data
+        assert np.array_equal(states[0, : start.size], start)
+
+
 def test_the_toy_is_as_its_operators_say():
     state = POINTS.task(0).initial_state
     space = POINTS.atom_space(state)

@@ -5,9 +5,10 @@
 import pytest
 
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, StageEnd
+from slap_ros.acquisition.curriculum.solved_shares import Point, SolvedShares
 from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.api.acquisition import UnwatchedCurriculum
-from slap_ros.api.learning_curves import CurveCallback, Point, steps_to
+from slap_ros.api.learning_curves import CurveCallback, steps_to
 
 PLAN = ("Pick(a)", "Put(a)", "Pick(b)", "Put(b)")
 
@@ -61,3 +62,26 @@ def test_a_level_is_reached_once_three_judgements_in_a_row_have_it(success, step
 
 def test_one_judgement_is_enough_where_no_more_are_asked_for():
     assert steps_to([Point(0, 0.0), Point(5, 0.9), Point(9, 0.1)], 0.8) == (5, True)
+
+
+def judged(*shares):
+    return SolvedShares([Point(number, share) for number, share in enumerate(shares)])
+
+
+def test_a_goal_is_done_after_three_judgements_in_a_row_and_not_before():
+    assert judged(0.1, 0.8, 0.9, 0.8).done(0.8)
+    assert not judged(0.9, 0.9).done(0.8)
+    assert not judged(0.9, 0.9, 0.7).done(0.8)
+    assert not judged(0.9, 0.7, 0.9, 0.9).done(0.8)
+
+
+def test_a_skill_needs_what_the_others_of_its_plan_leave_to_it():
+    """The stages of all that are learned share it evenly; others stay as they are."""
+    solved = SolvedShares()
+    solved.carried_out(0, [rollout(0, 4), rollout(1, 4), rollout(2, 4), rollout(3, 1)])
+    # every Pick is done, and of seven Puts six
+    assert solved.needed(0.81, ["Put"]) == pytest.approx(0.9)
+    assert solved.needed(0.81, ["Pick"]) == pytest.approx((0.81 / (6 / 7) ** 2) ** 0.5)
+    assert solved.needed(0.81, ["Pick", "Put"]) == pytest.approx(0.81**0.25)
+    solved.carried_out(0, [rollout(0, 0)])
+    assert solved.needed(0.8, ["Pick"]) > 1.0  # Put was never tried

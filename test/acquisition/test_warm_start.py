@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
+from slap_ros.acquisition.curriculum.solved_shares import Point
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.episodes import load_episodes, save_episodes
 from slap_ros.acquisition.training.guided_sac import Guide, GuidedSac
@@ -22,7 +23,6 @@ from slap_ros.acquisition.training.skill_env import SkillMdp, SkillVecEnv
 from slap_ros.acquisition.training.warm_start import ChosenStart, TriedStart, WarmStart
 from slap_ros.acquisition.training.warm_start_settings import WarmStartSettings
 from slap_ros.api.acquisition import UnwatchedCurriculum
-from slap_ros.api.learning_curves import Point
 from slap_ros.cli.skills import beginning
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.workers import SequentialWorkers

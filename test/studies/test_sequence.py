@@ -27,7 +27,7 @@ def sequence(folder, steps, solved, scratch=False, **changes):
             "tried": dict.fromkeys(GOALS[: len(success)], 0.9),
             "solved": dict(zip(GOALS, success, strict=False)),
         }
-        for goal, count, success in zip(GOALS, steps, solved, strict=True)
+        for goal, count, success in zip(GOALS, steps, solved, strict=False)
     ]
     folder.mkdir()
     about = {
@@ -65,6 +65,23 @@ def test_later_goals_are_compared_with_the_first_and_forgetting_shows(tmp_path):
         "| from scratch | task2 | 1 | 900 ± 0 | 1800 ± 0 | 1.00 ± 0.00 | 0.00 ± 0.00 | "
         "1.00 ± 0.00 |" in page
     )
+
+
+def test_a_sequence_that_has_not_come_to_its_end_counts_as_far_as_it_came(tmp_path):
+    whole = sequence(tmp_path / "0", (1000, 200, 300), ((1.0,), (1.0, 1.0), (1.0, 1.0, 1.0)))
+    begun = sequence(tmp_path / "s", (1000, 600), ((0.5,), (0.25, 0.5)), scratch=True)
+    ran = study("--library", whole, "--library", begun, "--output", tmp_path / "out")
+    assert ran.exit_code == 0, ran.output
+    found = json.loads((tmp_path / "out" / "sequence_groceries.json").read_text())["found"]
+    assert found["later_over_first"] == {"carried on": 0.25, "from scratch": 0.6}
+    page = (tmp_path / "out" / "sequence_groceries.md").read_text()
+    assert page.count("| from scratch | task") == 2
+    assert "goals_of_each_sequence: carried on `3`, from scratch `2`" in page
+    other = sequence(tmp_path / "o", (1000,), ((0.5,),))
+    about = json.loads((other / "library.json").read_text().replace("task0", "task7"))
+    (other / "library.json").write_text(json.dumps(about))
+    refused = study("--library", whole, "--library", other, "--output", tmp_path / "none")
+    assert "different goals" in " ".join(refused.stderr.split())
 
 
 @pytest.mark.parametrize(

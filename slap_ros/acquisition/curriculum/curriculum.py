@@ -14,7 +14,8 @@ An iteration of :meth:`Curriculum.run` is one of the algorithm:
   it (``dead_ends``);
 - *write back*: the best checkpoint is a skill at hand of the next iteration; in the end, a known
   skill that does as well as what was learned from it stays instead (``known_or_learned``);
-- *until nothing fails*, or progress is enough twice, or the budget is spent.
+- *until nothing fails*, or progress is enough twice, or enough tasks are solved
+  (``solved_shares``), or the budget is spent.
 
 Skills that do not fail are never trained. What is known between iterations is a
 ``CurriculumState``. Every result is kept in a ``curriculum_folder``, so that the same command
@@ -49,6 +50,7 @@ from slap_ros.acquisition.curriculum.skill_selection import (
 from slap_ros.acquisition.curriculum.task_source import ROLLOUTS, VALIDATION, TaskSource
 from slap_ros.acquisition.training.retrieval import METRICS, MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.acquisition.training.skill_training import rounds_in
 from slap_ros.acquisition.training.warm_start import (
     ChosenStart,
     TriedStart,
@@ -79,6 +81,8 @@ class Curriculum:
             are, and learned further only where they fail.
         encoder: Encoder that gives operators the keys by which known skills are found.
         shortcuts: Shortcuts after which skills are tried as well; None for no shortcuts.
+        continued: Folders of the trainings of kept skills, by operator name. Where these skills are
+            learned further, their trainings go on.
     """
 
     source: TaskSource
@@ -90,6 +94,7 @@ class Curriculum:
     encoder: SkillEncoder = field(default_factory=MetricSignatureEncoder)
     kept: dict[str, AcquiredSkill] = field(default_factory=dict)
     shortcuts: ShortcutsChoice | None = None
+    continued: Mapping[str, Path] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._results = CurriculumFolder(self.folder)
@@ -103,7 +108,7 @@ class Curriculum:
         self._warm_starts = WarmStarts(self._kept, self.known, self.encoder, least)
 
     def run(self) -> SkillLibrary:
-        """Acquire skills until nothing fails, progress is enough twice, or the budget is spent.
+        """Acquire skills until nothing fails, that is enough, or the budget is spent.
 
         Returns:
             The library of skills; its record says why the curriculum ended.
@@ -134,6 +139,7 @@ class Curriculum:
         rollouts = self._roll_out(iteration, "rollouts", tasks, at_hand)
         require_plans(rollouts, self.source)
         state.task_progress.append(fmean(rollout.progress for rollout in rollouts))
+        state.solved.carried_out(state.steps, rollouts)
         self.callback.on_rollouts(iteration, rollouts)
         if over := self._why_over(rollouts, state):
             return over
@@ -157,6 +163,8 @@ class Curriculum:
         latest = state.task_progress[-TWICE:]
         if len(latest) == TWICE and min(latest) >= self.settings.progress:
             return "progress is enough"
+        if state.solved.done(self.settings.solved):
+            return "enough tasks are solved"
         if self._steps_left(state) < self._segment_steps:
             return "the budget is spent"
         return ""
@@ -267,15 +275,18 @@ class Curriculum:
             starts: How skills that are learned for the first time begin, by name.
         """
         settings = replace(self.settings, skill_steps=selection.steps)
+        needed = state.solved.needed(settings.solved, selection.operators)
         rounds = []
         for name in selection.operators:
             skill = state.skills[name]
-            number, attempt = skill.rounds, skill.attempt
+            attempt = skill.attempt
+            continued = None if attempt else self.continued.get(name)
+            number = skill.rounds + (len(rounds_in(continued)) if continued else 0)
             start = starts.get(name, ChosenStart())
             if start.start is not None:
                 self._begun[name] = start.start
             states = InitiationStates.of(name, rollouts), InitiationStates.of(name, fresh)
-            if attempt and not number:
+            if attempt and not skill.rounds:
                 states = states[0].for_another, states[1]
             folder = self._results.training(name, attempt)
             rounds.append(
@@ -289,6 +300,8 @@ class Curriculum:
                     start.start,
                     attempt,
                     start.tried,
+                    needed,
+                    continued,
                 )
             )
         return rounds
@@ -298,6 +311,7 @@ class Curriculum:
         left = self._steps_left(state)
         outcomes = self._results.rounds(iteration, lambda: self._learn(iteration, rounds, left))
         for job, outcome in zip(rounds, outcomes, strict=True):
+            state.solved.learned(state.steps, self._segment_steps, job.operator, outcome)
             state.skills[job.operator] = state.skills[job.operator].after(job, outcome)
             self.callback.on_judged(iteration, job.operator, outcome)
 
@@ -363,14 +377,19 @@ class Curriculum:
         return folder
 
     def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
-        """What policies that see nothing are worth in each skill's place; None where untried."""
+        """What policies that see nothing are worth in each skill's place; None where untried.
+
+        That is the operator's, and known already where a training goes on.
+        """
+        going_on = self.continued.keys() & self._kept.keys()
+        known = {name: self._kept[name].record.get("vacuity") for name in going_on}
         starts = {name: InitiationStates.of(name, fresh).all for name in names}
-        begun = [name for name in names if starts[name]]
+        begun = [name for name in names if starts[name] and name not in known]
         work = [(self.source, name, starts[name], self.settings.judged) for name in begun]
         found = self._results.vacuity(
             partial(self._run, "trying constant actions", jobs.vacuity, work)
         )
-        return dict.fromkeys(names) | dict(zip(begun, found, strict=True))
+        return dict.fromkeys(names) | known | dict(zip(begun, found, strict=True))
 
     # -- plumbing ---------------------------------------------------------------------------------
 
@@ -379,13 +398,16 @@ class Curriculum:
 
     @property
     def _stored_settings(self) -> dict[str, Any]:
-        """All hyper-parameters as JSON; those of warm starts where there may be one.
+        """All hyper-parameters as JSON, but those on which the training does not depend.
 
-        Other trainings do not depend on these, and continue in folders of earlier versions.
+        So other trainings continue in folders of earlier versions, which do not have them.
         """
         settings = stored(self.settings)
-        warm_start = settings.pop("warm_start")
-        return {**settings, "warm_start": warm_start} if self.known or self.kept else settings
+        if not (self.known or self.kept):
+            settings.pop("warm_start")
+        if self.settings.solved == 1.0:
+            settings.pop("solved")
+        return settings
 
     def _as_json(self) -> dict[str, Any]:
         """All that the results depend on, as JSON."""
@@ -397,6 +419,8 @@ class Curriculum:
             data["shortcuts"] = self.shortcuts.digest
         if self.kept:
             data["kept"] = SkillLibrary(self.source.domain.name, tuple(self.kept.values())).digest
+        if self.continued:
+            data["continued"] = sorted(self.continued)
         return data
 
     def _run(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from slap_ros.acquisition.curriculum.jobs import LearningJob
+from slap_ros.acquisition.curriculum.solved_shares import SolvedShares
 from slap_ros.acquisition.training.skill_training import Round
 
 NEVER_JUDGED = -1.0  # below every success
@@ -74,11 +75,13 @@ class CurriculumState:
         task_progress: Task progress of the rollouts of each iteration, mean over tasks.
         not_trained: Reasons why skills that failed in the last iteration were not trained, by
             operator.
+        solved: Judgements of whole tasks.
     """
 
     skills: dict[str, SkillProgress]
     task_progress: list[float] = field(default_factory=list)
     not_trained: dict[str, Any] = field(default_factory=dict)
+    solved: SolvedShares = field(default_factory=SolvedShares)
 
     @classmethod
     def initial(cls, operators: Iterable[str]) -> CurriculumState:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -17,6 +18,7 @@ from slap_ros.acquisition.curriculum.after_shortcuts import AfterShortcuts, Shor
 from slap_ros.acquisition.curriculum.initiation_states import InitiationRecord, InitiationStates
 from slap_ros.acquisition.curriculum.rollouts import roll_out
 from slap_ros.acquisition.curriculum.task_source import TaskSource
+from slap_ros.acquisition.training.continued_training import continue_training, earlier_starts
 from slap_ros.acquisition.training.judges import (
     Judge,
     JudgeElsewhere,
@@ -55,6 +57,10 @@ class LearningJob:
         warm_start: Known skill that the first round begins with; None for no warm start.
         attempt: Number of times that the skill was learned from scratch before.
         tried: Known skills that were tried before the first round, for the record.
+        needed: Success rate that the goal needs, as in
+            :class:`~slap_ros.acquisition.training.skill_training.SkillTraining`.
+        continued: Folder of the skill's training for an earlier goal, which goes on; None where
+            training begins.
     """
 
     source: TaskSource
@@ -67,6 +73,8 @@ class LearningJob:
     warm_start: WarmStart | None = None
     attempt: int = 0
     tried: tuple[TriedStart, ...] = ()
+    needed: float = math.inf
+    continued: Path | None = None
 
     @property
     def segment_steps(self) -> int:
@@ -120,6 +128,9 @@ def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:
     reward = _reward(source, job.operator, domain)
     accepted, refused = _starts(job, domain)
     policy = job.warm_start.policy if job.warm_start is not None else None
+    if job.continued is not None:
+        continue_training(job.continued, job.folder)
+        accepted += _earlier_starts(job.continued, domain, len(accepted), settings.rehearsal)
     with _judge(job, domain, cores) as judge, _worlds(job, domain, cores) as make_worlds:
         training = SkillTraining(
             domain,
@@ -130,6 +141,7 @@ def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:
             job.folder,
             make_worlds,
             job.attempt,
+            job.needed,
         )
         outcome = training.run(job.number, accepted, judge, policy)
     return {**asdict(outcome), "refused": refused}
@@ -200,6 +212,11 @@ def _starts(job: LearningJob, domain: Domain) -> tuple[list[Initiation], int]:
             "learned"
         )
     return accepted, refused
+
+
+def _earlier_starts(earlier: Path, domain: Domain, new: int, rehearsal: float) -> list[Initiation]:
+    """States of an earlier goal, as many beside new ones as are rehearsed of these."""
+    return earlier_starts(earlier, domain.types_by_name, round(new * rehearsal / (1.0 - rehearsal)))
 
 
 def try_known(

@@ -29,6 +29,9 @@ class AcquisitionSettings:
         total_steps: Environment steps that all skills together learn for, at most.
         enough: Success rate from which on a checkpoint is good, as two in a row are to be.
         progress: Task progress from which on a curriculum is over, as two in a row are to be.
+        solved: Share of solved tasks from which on a curriculum is over, as three judgements in a
+            row are to be. A skill then learns until three judgements in a row are as good as that
+            needs. With 1, a curriculum goes on until nothing fails.
         patience: Number of rounds without progress after which a skill is left for others.
         rehearsal: Share of the states learned from that are states in which the skill succeeded
             before.
@@ -47,6 +50,7 @@ class AcquisitionSettings:
     total_steps: int = 150_000
     enough: float = 0.95
     progress: float = 0.95
+    solved: float = 1.0
     patience: int = 2
     rehearsal: float = 0.25
     least_similarity: float = 0.3

@@ -9,8 +9,10 @@ alone. So all environments begin and end together, and the last step is a trunca
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,15 +144,10 @@ class SkillVecEnv:
         self.rounds = first_round
         self._seed = tuple(seed)
         self._make_worlds = make_worlds or mdp.domain.make_vector_world
-        pools = _pools(initiations)
-        shares = proportional_shares([len(pool) for pool in pools], num_envs)
-        used = [(pool, share) for pool, share in zip(pools, shares, strict=True) if share]
-        bounds = np.cumsum([share for _, share in used])[:-1]
-        self._pools = [pool for pool, _ in used]
-        self._parts = np.split(np.arange(num_envs), bounds)
+        self._starts = _starts(initiations, num_envs)
         self._rows = np.zeros((num_envs, mdp.groundings.width))
         self._numbers = np.zeros(num_envs, dtype=np.intp)
-        self._worlds: list[VectorWorld] = []
+        self._made: dict[tuple[Layout, int], VectorWorld] = {}
         self._finished: list[Episodes] = []
         self.succeeded: Bools = np.zeros(num_envs, dtype=bool)  # by the episodes that ended last
         self._begin_round()
@@ -158,7 +155,7 @@ class SkillVecEnv:
     def step(self, actions: Array) -> VecEnvStep:
         """See :meth:`slap_ros.learning.vec_env.VecEnv.step`; no episode ends by success."""
         commands = self.action_map(np.asarray(actions, dtype=np.float64))
-        for world, part in zip(self._worlds, self._parts, strict=True):
+        for part, world in self._worlds:
             self._rows[part] = self.mdp.groundings.rows(world.step(commands[part]).data)
         self._trace.append(self._rows.copy())
         self._actions.append(np.array(actions, dtype=np.float32))
@@ -201,22 +198,88 @@ class SkillVecEnv:
     def _begin_round(self) -> None:
         """Draw the state in which every environment begins its next episode."""
         rng = np.random.default_rng((*self._seed, self.rounds))
-        fresh = not self._worlds
-        for number, (pool, part) in enumerate(zip(self._pools, self._parts, strict=True)):
-            drawn = [pool[int(rng.integers(len(pool)))] for _ in part]
-            if fresh:
-                states = [initiation.state for initiation in drawn]
-                self._worlds.append(self._make_worlds(states))
-            for i, (env, initiation) in enumerate(zip(part, drawn, strict=True)):
-                if not fresh:
-                    self._worlds[number].reset(i, initiation.state)
-                self._numbers[env] = self.mdp.groundings.number(initiation.grounding)
-            batch = State.batch([initiation.state for initiation in drawn])
-            self._rows[part] = self.mdp.groundings.rows(batch.data)
+        drawn, same = self._starts.draw(rng), Counter[Layout]()
+        self._worlds: list[tuple[Indices, VectorWorld]] = []
+        for part, begun in drawn:
+            states, layout = [one.state for one in begun], begun[0].state.layout
+            self._worlds.append((part, self._worlds_in(states, same[layout])))
+            same[layout] += 1
+            self._numbers[part] = [self.mdp.groundings.number(one.grounding) for one in begun]
+            self._rows[part] = self.mdp.groundings.rows(State.batch(states).data)
         self._trace: list[Array] = [self._rows.copy()]
         self._actions: list[NDArray[np.float32]] = []
         self._success: Bools = np.zeros(self.num_envs, dtype=bool)
         self.observations = self.mdp.observe(self._rows, self._numbers)
+
+    def _worlds_in(self, states: Sequence[State], number: int) -> VectorWorld:
+        """Worlds in states over the same objects; those of earlier episodes, reset.
+
+        Args:
+            states: States of the worlds.
+            number: Number of these worlds among those over the same objects, from 0.
+        """
+        key = states[0].layout, number
+        worlds = self._made.pop(key, None)
+        if worlds is None:
+            worlds = self._make_worlds(states)
+        else:
+            for i, state in enumerate(states):
+                worlds.reset(i, state)
+        self._made[key] = worlds  # last
+        if len(self._made) > 2 * self.num_envs:  # simulations take tens of megabytes each
+            del self._made[next(iter(self._made))]
+        return worlds
+
+
+Drawn = list[tuple[Indices, list[Initiation]]]  # environments, and the states that they begin in
+
+
+class _Starts(Protocol):
+    """Draws the states in which all environments begin their next episodes."""
+
+    def draw(self, rng: np.random.Generator) -> Drawn:
+        """States for environments that have the same objects.
+
+        Args:
+            rng: Generator that draws them.
+        """
+        ...
+
+
+def _starts(initiations: Sequence[Initiation], num_envs: int) -> _Starts:
+    pools = _pools(initiations)
+    return _AnyStarts(initiations, num_envs) if len(pools) > num_envs else _Pools(pools, num_envs)
+
+
+class _Pools:
+    """Each pool, of states over the same objects, has environments of its own."""
+
+    def __init__(self, pools: Sequence[Sequence[Initiation]], num_envs: int) -> None:
+        shares = proportional_shares([len(pool) for pool in pools], num_envs)
+        used = [(pool, share) for pool, share in zip(pools, shares, strict=True) if share]
+        bounds = np.cumsum([share for _, share in used])[:-1]
+        self._pools = [pool for pool, _ in used]
+        self._parts = np.split(np.arange(num_envs), bounds)
+
+    def draw(self, rng: np.random.Generator) -> Drawn:
+        return [
+            (part, [pool[int(rng.integers(len(pool)))] for _ in part])
+            for pool, part in zip(self._pools, self._parts, strict=True)
+        ]
+
+
+class _AnyStarts:
+    """Every environment begins anywhere: there are fewer environments than pools.
+
+    With environments of their own, most pools would have none, and nothing would be learned there.
+    """
+
+    def __init__(self, initiations: Sequence[Initiation], num_envs: int) -> None:
+        self._initiations, self._num_envs = initiations, num_envs
+
+    def draw(self, rng: np.random.Generator) -> Drawn:
+        drawn = rng.choice(len(self._initiations), self._num_envs, replace=False)
+        return [(np.array([env]), [self._initiations[i]]) for env, i in enumerate(drawn)]
 
 
 def _pools(initiations: Sequence[Initiation]) -> list[list[Initiation]]:

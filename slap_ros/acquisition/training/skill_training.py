@@ -15,6 +15,7 @@ judged, the next segment is learned, unless the round may be over then. A folder
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 ROUNDS = "rounds.json"
 IN_A_ROW = 2  # good judgements after which a round is over
+ENOUGH_IN_A_ROW = 3  # judgements after which one is over that are as good as the goal needs
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ class Round:
         better = success > self.success
         return replace(self, segments=segments, best=len(segments) if better else self.best)
 
-    def good(self, enough: float, judgements: int = IN_A_ROW) -> bool:
+    def good(self, enough: float, judgements: int) -> bool:
         """Whether so many of the latest judgements are good."""
         latest = (self.initial, *self.segments)[-judgements:]
         return len(latest) == judgements and min(latest) >= enough
@@ -104,6 +106,16 @@ def rounds_in(folder: Path) -> list[Round]:
         raise damaged(path, error, "remove its folder to learn this skill again") from error
 
 
+def episodes_path(folder: Path, segment: int) -> Path:
+    """The file with the episodes of a segment.
+
+    Args:
+        folder: Folder of the skill's training.
+        segment: Number of the segment, from 0.
+    """
+    return folder / "episodes" / f"{segment:03}.safetensors"
+
+
 @dataclass
 class SkillTraining:
     """The training of one skill, round after round in the same folder.
@@ -117,6 +129,7 @@ class SkillTraining:
         folder: Folder of the skill's training.
         make_worlds: Function that makes the domain's worlds that are learned in.
         attempt: Number of times that the skill was learned from scratch before.
+        needed: Success rate that the goal needs; above 1 to go by the settings alone.
     """
 
     domain: Domain
@@ -127,6 +140,7 @@ class SkillTraining:
     folder: Path
     make_worlds: MakeVectorWorld
     attempt: int = 0
+    needed: float = math.inf
     _rounds: list[Round] = field(default_factory=list, init=False)
 
     def run(
@@ -167,7 +181,7 @@ class SkillTraining:
         ahead = self._judge(learner, judge, done, None) if begins else None
         while not self._rounds[-1].over:
             episodes = learner.learn(self.settings.segment_episodes) if ahead is None else ahead
-            save_episodes(self._episodes(done), episodes)
+            save_episodes(episodes_path(self.folder, done), episodes)
             done += 1
             ahead = self._judge(learner, judge, done, self._rounds[-1])
         return self._rounds[-1]
@@ -214,7 +228,7 @@ class SkillTraining:
                 it when it is resumed as well; None for random weights.
         """
         types = self.domain.types_by_name
-        earlier = [load_episodes(self._episodes(i), types) for i in range(done)]
+        earlier = [load_episodes(episodes_path(self.folder, i), types) for i in range(done)]
         if beginning is not None:
             learner.begin_with(beginning, self.settings.warm_start)
         if done:
@@ -256,7 +270,13 @@ class SkillTraining:
     def _may_be_over(self, before: Round) -> bool:
         """Whether a round may be over after one more judgement."""
         last = len(before.segments) + 1 == self.settings.segments(self.horizon)
-        return last or before.good(self.settings.enough, IN_A_ROW - 1)
+        return last or self._is_good(before, judgements_left=1)
+
+    def _is_good(self, judged: Round, judgements_left: int = 0) -> bool:
+        """Whether enough judgements in a row are good, but for so many."""
+        return judged.good(self.settings.enough, IN_A_ROW - judgements_left) or judged.good(
+            self.needed, ENOUGH_IN_A_ROW - judgements_left
+        )
 
     def _take_note(self, success: float, before: Round | None) -> None:
         if before is None:
@@ -264,7 +284,7 @@ class SkillTraining:
             return
         now = before.with_segment(success)
         over = len(now.segments) == self.settings.segments(self.horizon)
-        self._rounds[-1] = replace(now, over=over or now.good(self.settings.enough))
+        self._rounds[-1] = replace(now, over=over or self._is_good(now))
 
     def _keep_best(self, policy: MlpPolicy, done: int) -> None:
         """Keep a policy as the best one, with its checkpoint."""
@@ -276,9 +296,6 @@ class SkillTraining:
 
     def _checkpoint(self, segments: int) -> Path:
         return self.folder / f"{segments:03}.pt"
-
-    def _episodes(self, number: int) -> Path:
-        return self.folder / "episodes" / f"{number:03}.safetensors"
 
     def _write_rounds(self) -> None:
         data = [asdict(one) for one in self._rounds]

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
+from slap_ros.acquisition.curriculum.solved_shares import Point
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.api.acquisition import UnwatchedCurriculum, acquirable, known_skills
-from slap_ros.api.learning_curves import CurveCallback, Point
+from slap_ros.api.learning_curves import CurveCallback
 from slap_ros.learning.workers import SequentialWorkers
 
 

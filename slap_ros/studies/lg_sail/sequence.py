@@ -29,18 +29,20 @@ if TYPE_CHECKING:
 
 MEASURED = """\
 Skills are acquired for one goal after another. A library is carried on: skills that carry out the
-next goal are used as they are, and learned further where they fail. Beside it are sequences in
-which each goal is learned from scratch, where such were run. *Steps to .8* are those after which
-three judgements in a row, of which it is the first, had .8 of the goal's tasks solved, as the paper
-counts them; at the end of a goal, where nothing is learned any more, fewer suffice. A judgement is
-made after every segment of a skill's training (2,000 steps by default): the product of the success
-of the plan's skills, from states that plans come to. Between rounds of training, and at the end,
-whole plans are carried out instead. *All steps* go on until nothing fails, or the budget is spent.
-Steps are of all skills together, the mean ± sample standard deviation over sequences; a cell has a
-≥ where a sequence never came to .8 at a goal, and its whole length counts. *Solved* is the share of
-tasks, which training never sees, whose stages were all done right after the goal was learned. For
-all goals before, it is given as it is now, and as it was right after each of these was learned.
-Judgements and trials are not counted as steps."""
+next goal are used as they are, and learned further where they fail, with critics and replay buffer.
+Beside it are sequences in which each goal is learned from scratch, where such were run. *Steps to
+.8* are those after which three judgements in a row, of which it is the first, had .8 of the goal's
+tasks solved, as the paper counts them; at the end of a goal, where nothing is learned any more,
+fewer suffice. A judgement is made after every segment of a skill's training (2,000 steps by
+default): the product of the success of the plan's skills, from states that plans come to. Between
+rounds of training, and at the end, whole plans are carried out instead. *All steps* go on until
+enough tasks are solved three judgements in a row (the setting `solved`, .8 by default), the last of
+whole plans, until nothing fails, or until the budget is spent. Steps are of all skills together,
+the mean ± sample standard deviation over sequences; a cell has a ≥ where a sequence never came to
+.8 at a goal, and its whole length counts. A sequence that has not come to its last goal counts as
+far as it came. *Solved* is the share of tasks, which training never sees, whose stages were all
+done right after the goal was learned. For all goals before, it is given as it is now, and as it was
+right after each of these was learned. Judgements and trials are not counted as steps."""
 SEQUENCES = "runs/sequences"
 CARRIED, SCRATCH = "carried on", "from scratch"
 
@@ -69,24 +71,22 @@ class GoalOfSequence:
 
 
 def goals_of(sequences: Sequence[Sequence[SequenceStep]]) -> list[GoalOfSequence]:
-    """The goals of sequences that have the same ones, in their order."""
+    """The goals of sequences that have the same ones, in their order; some may not have come far.
+
+    Args:
+        sequences: What came of the goals of each sequence.
+    """
     found = []
-    for number, first in enumerate(sequences[0] if sequences else ()):
-        own = [sequence[number] for sequence in sequences]
-        earlier = [[one.goal for one in sequence[:number]] for sequence in sequences]
+    for number in range(max(map(len, sequences), default=0)):
+        so_far = [sequence[: number + 1] for sequence in sequences if len(sequence) > number]
+        own = [steps[-1] for steps in so_far]
         kept = [
-            fmean(s.solved[g] for g in goals)
-            for s, goals in zip(own, earlier, strict=True)
-            if goals
+            fmean(steps[-1].solved[one.goal] for one in steps[:-1]) for steps in so_far if number
         ]
-        before = [
-            fmean(one.solved[one.goal] for one in sequence[:number])
-            for sequence in sequences
-            if number
-        ]
+        before = [fmean(one.solved[one.goal] for one in steps[:-1]) for steps in so_far if number]
         found.append(
             GoalOfSequence(
-                first.goal,
+                own[0].goal,
                 tuple(one.steps_to_level for one in own),
                 sum(one.reached for one in own),
                 tuple(one.steps for one in own),
@@ -230,16 +230,17 @@ def prepare(options: SequenceStudyOptions, tell: Tell) -> PreparedStudy:
             continue
         kinds[kind].append(steps)
     sequences = [steps for of_kind in kinds.values() for steps in of_kind]
+    goals = [[step.goal for step in steps] for steps in sequences]
     if not sequences:
         raise InvalidParameterError(
             f"no sequence of {domain.name} is left; `slap acquire-sequence {domain.name}` makes one"
         )
-    if len({tuple(step.goal for step in steps) for steps in sequences}) > 1:
+    if any(one != max(goals, key=len)[: len(one)] for one in goals):
         raise InvalidParameterError("these sequences have different goals; compare others")
     known = {kind: of_kind for kind, of_kind in kinds.items() if of_kind}
-    counts = {kind: len(of_kind) for kind, of_kind in known.items()}
+    counts = {kind: [len(steps) for steps in of_kind] for kind, of_kind in known.items()}
     return PreparedStudy(
-        {"trainings": len(sequences), "sequences": counts},
+        {"trainings": len(sequences), "goals_of_each_sequence": counts},
         lambda _: study(domain.name, known),
         {
             "library": [folder.as_posix() for folder in folders] if options.library else None,

@@ -14,11 +14,12 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.acquisition.curriculum.jobs import horizon_of
+from slap_ros.acquisition.curriculum.solved_shares import Point
 from slap_ros.api.acquisition import acquirable, known_skills, require_budget
 from slap_ros.api.acquisition_request import AcquisitionRequest
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.jobs import require_torch
-from slap_ros.api.learning_curves import PLAN, Point, steps_to
+from slap_ros.api.learning_curves import PLAN, steps_to
 from slap_ros.api.left_out import Tell
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import Interval, ratio_interval
