@@ -41,6 +41,8 @@ from slap_ros.relational import (
 # Of a task that begins in a state; an UnknownObjectError where that lacks an object of the goal.
 Goal = Callable[[State], frozenset[GroundAtom]]
 MOST_DRAWN = 1_000  # tasks, until one has the objects of a named goal
+# What the configuration of a domain says whose states are measured on a robot.
+MEASURED: Mapping[str, str] = {"states": "measured"}
 
 
 @dataclass(frozen=True)
@@ -182,6 +184,16 @@ class Domain(ShownInNotebooks):
         """What a learned policy may command."""
         learned = self.learning.actions if self.learning is not None else None
         return learned or self.action_space
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether its states are measured on a robot."""
+        return MEASURED.items() <= self.configuration.items()
+
+    @property
+    def is_foreseeable(self) -> bool:
+        """Whether nothing happens in its world but what planners know: to look again is useless."""
+        return self.make_model is None and not self.is_measured
 
     @property
     def steps_together(self) -> bool:

@@ -151,8 +151,9 @@ class Executor:
     _percept: Percept = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        changing = self.domain.make_model is not None
-        self._perceiver = self.perceiver or ExactPerceiver(self.space, changing)
+        self._perceiver = self.perceiver or ExactPerceiver(
+            self.space, changing=not self.domain.is_foreseeable
+        )
         self._percept = self._perceiver.perceive(self.world.state)
 
     def run(self) -> EpisodeResult:
