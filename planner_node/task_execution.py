@@ -158,10 +158,13 @@ class TaskExecution:
 
     async def _plan(self) -> Plan:
         state, number = self._latest.state, self._statistics.plans
+        domain = self._latest.episode.domain
         self._statistics.plans += 1
         self._feedback(SolveTask.Feedback.PLANNING)
         started = self._event(PlanEvent.PLANNING_STARTED)
-        job = submit(self.workers, lambda: self.planner.plan(state, self.goal_mask))
+        job = submit(
+            self.workers, lambda: self.planner.plan(domain.to_plan_from(state), self.goal_mask)
+        )
         await self._wait(job)
         result: PlanningResult = job.result().result()
         if result.fails:

@@ -53,10 +53,12 @@ class Execution:
         control_period_s: Duration of one environment step, s.
         settle: Function that puts measured poses where physics would have them. What rests on
             something in the given state still rests on it afterwards.
+        lift: Function that lifts what is held off what it touches.
     """
 
     control_period_s: float
     settle: Callable[[State], State] = lambda state: state
+    lift: Callable[[State], State] = lambda state: state
 
 
 @dataclass(frozen=True)
@@ -231,6 +233,14 @@ class Domain(ShownInNotebooks):
         if self.learning is not None and self.learning.make_vector_world is not None:
             return self.learning.make_vector_world(states)
         return SyncVectorWorld(self.make_world, states)
+
+    def to_plan_from(self, state: State) -> State:
+        """The state that a plan begins in; a measured one is not taken to touch what it holds.
+
+        Args:
+            state: Newest state.
+        """
+        return self.execution.lift(state) if self.is_measured else state
 
     def model_world(self, state: State) -> World:
         """A world as planners know it, in a state; it is nobody else's."""

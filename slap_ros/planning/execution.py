@@ -196,7 +196,8 @@ class Executor:
         else:
             started = perf_counter()
             try:
-                result = self.planner.plan(self._percept.state, self.goal)
+                start = self.domain.to_plan_from(self._percept.state)
+                result = self.planner.plan(start, self.goal)
             finally:
                 execution.seconds = perf_counter() - started
                 episode.planning_seconds += execution.seconds
