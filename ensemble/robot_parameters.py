@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 from ensemble.camera_parameters import CameraParameters
@@ -17,6 +17,7 @@ from slap_ros.robot.franka.arm import COLLISION_FORCE, COLLISION_TORQUE, FrankaS
 from slap_ros.robot.franka.limits import JERK, franka_limits
 from slap_ros.robot.limits import FR3, Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.worlds.panda import JOINTS
 
 # As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
@@ -109,6 +110,11 @@ class RobotBridgeParameters(RobotParameters, WorldParameters):
     settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
     detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
     hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
+
+    @property
+    def choice(self) -> DomainChoice:
+        """The domain that runs, whose states are measured."""
+        return replace(super().choice, measured=True)
 
     @property
     def motion_limits(self) -> MotionLimits:

@@ -36,7 +36,7 @@ from slap_ros.errors import (
     SlapError,
     TaskCanceledError,
 )
-from slap_ros.planning.execution import DIVERGENCES
+from slap_ros.planning.execution import DIVERGENCES, FINAL, UNPLANNED
 from slap_ros.planning.options import OptionResult, hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.planner import Planner
@@ -44,9 +44,6 @@ from slap_ros.planning.planner import Planner
 ANSWER_TIMEOUT = 5.0  # s, for the skill server to accept a goal, or to end one that is canceled
 ASK_AGAIN = 2.0  # s without a result after which it is asked for again
 OBSERVE_TIMEOUT = 5.0  # s, for a state that the skill server has seen to be seen here too
-
-# Where wrong perception is the cause of these, perceiving again may help.
-UNPLANNED = frozenset({ErrorCode.UNSOLVABLE, ErrorCode.PLANNING_LIMIT, ErrorCode.INVALID_STATE})
 
 
 @dataclass
@@ -99,11 +96,12 @@ class TaskExecution:
     async def run(self) -> SolveTask.Result:
         """Solve the task; every outcome is published as an event, too."""
         while True:
+            unplanned = False
             try:
-                outcome = await self._plan_and_execute()
+                outcome, unplanned = await self._plan_and_execute()
             except SlapError as error:
                 outcome = OptionResult(error.code, str(error))
-            misperceived = outcome.code in UNPLANNED and not self._latest.exact
+            misperceived = unplanned and outcome.code not in FINAL and self._may_look_different
             if not misperceived and outcome.code not in DIVERGENCES:
                 break
             if self._statistics.plans > self.goal.request.max_replans:
@@ -121,9 +119,16 @@ class TaskExecution:
             self._event(PlanEvent.FAILED, error_code=int(outcome.code), error_msg=outcome.reason)
         return self._statistics.result(self._last_step, outcome)
 
-    async def _plan_and_execute(self) -> OptionResult:
-        """Make one plan and execute it, up to its first edge that fails."""
-        plan = await self._plan()
+    async def _plan_and_execute(self) -> tuple[OptionResult, bool]:
+        """Make one plan and execute it; second, whether there was no plan."""
+        try:
+            plan = await self._plan()
+        except UNPLANNED as error:
+            return OptionResult(error.code, str(error)), True
+        return await self._execute_plan(plan), False
+
+    async def _execute_plan(self, plan: Plan) -> OptionResult:
+        """Execute a plan, up to its first edge that fails."""
         for number, edge in enumerate(plan.edges):
             self._event(PlanEvent.EDGE_STARTED, edge=number)
             outcome = await self._execute(edge)
@@ -134,6 +139,12 @@ class TaskExecution:
                 return outcome
             self._event(PlanEvent.EDGE_REACHED, edge=number)
         return OptionResult(ErrorCode.NONE)
+
+    @property
+    def _may_look_different(self) -> bool:
+        """Whether another look may show something else, as an episode without nodes has it."""
+        latest = self._latest
+        return not (latest.exact and latest.episode.domain.is_foreseeable)
 
     async def _perceive_again(self) -> OptionResult:
         """Hold for a step, to perceive the same again."""
@@ -147,10 +158,13 @@ class TaskExecution:
 
     async def _plan(self) -> Plan:
         state, number = self._latest.state, self._statistics.plans
+        domain = self._latest.episode.domain
         self._statistics.plans += 1
         self._feedback(SolveTask.Feedback.PLANNING)
         started = self._event(PlanEvent.PLANNING_STARTED)
-        job = submit(self.workers, lambda: self.planner.plan(state, self.goal_mask))
+        job = submit(
+            self.workers, lambda: self.planner.plan(domain.to_plan_from(state), self.goal_mask)
+        )
         await self._wait(job)
         result: PlanningResult = job.result().result()
         if result.fails:

@@ -118,7 +118,8 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         self._since_s = (
             self._robot.clock.now_s()
         )  # when the phase, or the measurement of a state, began
-        self._goal: Collection[GroundAtom] = ()
+        told = self._settings.first_task(self._domain) if self._settings.goal else None
+        self._goal: Collection[GroundAtom] = told.goal if told is not None else ()
         self._measurement: StepMeasurement  # of the step under way
         period_s = self._domain.execution.control_period_s
         self._horizon = Horizon(self._settings.horizon, self._settings.motion_limits, period_s)

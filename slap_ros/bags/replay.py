@@ -14,7 +14,12 @@ from slap_ros.bags.ensembles import ROOT
 from slap_ros.bags.evaluate import EnsembleContents, read_runs
 from slap_ros.bags.recording import RecordedEpisode, initial_state
 from slap_ros.core import ActionSpace, Domain, World
-from slap_ros.errors import DamagedBagError, InvalidCommandError, InvalidStateError
+from slap_ros.errors import (
+    DamagedBagError,
+    InvalidCommandError,
+    InvalidParameterError,
+    InvalidStateError,
+)
 from slap_ros.messages.decode import decode_command, decode_state
 from slap_ros.messages.protocols import CommandMessage
 from slap_ros.relational import State
@@ -59,7 +64,7 @@ def replay_bag(path: Path | str, namespace: str | None = None) -> ReplayResult:
     Raises:
         DamagedBagError: Nothing in it can be read, or it breaks off before the domain is named.
         ForeignBagError: It is not of an ensemble, or of another version of one.
-        InvalidParameterError: There is no such ensemble.
+        InvalidParameterError: There is no such ensemble, or its states were measured on a robot.
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain or its task cannot have.
     """
@@ -70,6 +75,12 @@ def replay_bag(path: Path | str, namespace: str | None = None) -> ReplayResult:
         if domain is None:
             raise DamagedBagError(
                 f"{path} does not name the domain, so there is nothing to replay in"
+            )
+        if domain.is_measured:
+            raise InvalidParameterError(
+                f"{path} was recorded on a robot, real or simulated: its states are measured, and "
+                "no world repeats them bit for bit. `slap bag evaluate` computes its figures "
+                "again, `slap bag replay --to robot --dry-run` checks its motion"
             )
         _replay_ensemble(ensemble, domain, result)
     return result

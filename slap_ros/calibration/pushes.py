@@ -81,7 +81,7 @@ def read_pushes(path: Path, namespace: str | None = None) -> PushedRecording:
         DamagedBagError: Nothing in it can be read, or the domain is missing.
         ForeignBagError: It is not of an ensemble, or of another version of one.
         InvalidParameterError: There is no such ensemble, its things have no friction that could be
-            set, or hardly anything was pushed.
+            set, a robot was recorded that stops after every step, or hardly anything was pushed.
     """
     bag = read_bag(path)
     recording = Recording.of(bag, namespace)
@@ -105,6 +105,12 @@ def _require_friction(domain: Domain, path: Path) -> None:
         raise InvalidParameterError(
             f"{path} is of {domain.name}, preset {domain.preset}, in which planners take every "
             "thing for the same material and noise disturbs pushes; record pushes without them"
+        )
+    if domain.is_measured:
+        raise InvalidParameterError(
+            f"{path} was recorded on a robot, which stands still after every step: things never "
+            "slide on by themselves, and only that tells friction; give a recording of a "
+            "simulation, in which the arm does not stop between steps"
         )
 
 

@@ -41,6 +41,8 @@ from slap_ros.relational import (
 # Of a task that begins in a state; an UnknownObjectError where that lacks an object of the goal.
 Goal = Callable[[State], frozenset[GroundAtom]]
 MOST_DRAWN = 1_000  # tasks, until one has the objects of a named goal
+# What the configuration of a domain says whose states are measured on a robot.
+MEASURED: Mapping[str, str] = {"states": "measured"}
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,12 @@ class Execution:
         control_period_s: Duration of one environment step, s.
         settle: Function that puts measured poses where physics would have them. What rests on
             something in the given state still rests on it afterwards.
+        lift: Function that lifts what is held off what it touches.
     """
 
     control_period_s: float
     settle: Callable[[State], State] = lambda state: state
+    lift: Callable[[State], State] = lambda state: state
 
 
 @dataclass(frozen=True)
@@ -184,6 +188,16 @@ class Domain(ShownInNotebooks):
         return learned or self.action_space
 
     @property
+    def is_measured(self) -> bool:
+        """Whether its states are measured on a robot."""
+        return MEASURED.items() <= self.configuration.items()
+
+    @property
+    def is_foreseeable(self) -> bool:
+        """Whether nothing happens in its world but what planners know: to look again is useless."""
+        return self.make_model is None and not self.is_measured
+
+    @property
     def steps_together(self) -> bool:
         """Whether many worlds are stepped faster together than one after the other."""
         return self.learning is not None and self.learning.make_vector_world is not None
@@ -219,6 +233,14 @@ class Domain(ShownInNotebooks):
         if self.learning is not None and self.learning.make_vector_world is not None:
             return self.learning.make_vector_world(states)
         return SyncVectorWorld(self.make_world, states)
+
+    def to_plan_from(self, state: State) -> State:
+        """The state that a plan begins in; a measured one is not taken to touch what it holds.
+
+        Args:
+            state: Newest state.
+        """
+        return self.execution.lift(state) if self.is_measured else state
 
     def model_world(self, state: State) -> World:
         """A world as planners know it, in a state; it is nobody else's."""

@@ -151,8 +151,9 @@ class Executor:
     _percept: Percept = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        changing = self.domain.make_model is not None
-        self._perceiver = self.perceiver or ExactPerceiver(self.space, changing)
+        self._perceiver = self.perceiver or ExactPerceiver(
+            self.space, changing=not self.domain.is_foreseeable
+        )
         self._percept = self._perceiver.perceive(self.world.state)
 
     def run(self) -> EpisodeResult:
@@ -195,7 +196,8 @@ class Executor:
         else:
             started = perf_counter()
             try:
-                result = self.planner.plan(self._percept.state, self.goal)
+                start = self.domain.to_plan_from(self._percept.state)
+                result = self.planner.plan(start, self.goal)
             finally:
                 execution.seconds = perf_counter() - started
                 episode.planning_seconds += execution.seconds

@@ -9,6 +9,7 @@ bags. A library of skills is known by its digest, wherever its folder may be.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -43,6 +44,7 @@ class DomainChoice:
             ``demonstrator`` for the hand-written operators with scripts in the place of skills, or
             the folder of a library of acquired skills.
         digest: Digest of the library that must be found; empty for any library.
+        measured: Whether its states are measured on a robot.
 
     Raises:
         InvalidParameterError: Skills that are none of these.
@@ -52,6 +54,7 @@ class DomainChoice:
     preset: str = ""
     skills: str = SHIPPED
     digest: str = ""
+    measured: bool = False
 
     def __post_init__(self) -> None:
         if self.skills not in WORDS and not Path(self.skills).is_dir():
@@ -111,7 +114,7 @@ class DomainChoice:
         skills = SHIPPED if digest else said.get(SKILLS_KEY, SHIPPED)
         if skills not in WORDS:
             raise InvalidParameterError(f"unknown skills {skills!r}, announced without a digest")
-        return cls(str(info.name), str(info.preset), skills, digest)
+        return cls(str(info.name), str(info.preset), skills, digest, _is_measured(said))
 
     def with_skills_of(self, name: str, given: str) -> DomainChoice:
         """The choice of a node that was given skills of its own.
@@ -172,9 +175,9 @@ def open_domain(choice: DomainChoice) -> Domain:
         choice: Choice of the domain.
 
     Returns:
-        The domain; its configuration says whose skills it has, unless they are its own. Its
-        predicates, those that nothing changes among them, are the same whatever the skills, so
-        that the same state is perceived alike.
+        The domain; its configuration says whose skills it has, unless they are its own, and whether
+        its states are measured. Its predicates, those that nothing changes among them, are the same
+        whatever the skills, so that the same state is perceived alike.
 
     Raises:
         UnknownDomainError: No such domain.
@@ -183,6 +186,15 @@ def open_domain(choice: DomainChoice) -> Domain:
         InvalidLibraryError: The folder has no library of this domain that can be read.
         SkillsChangedError: The folder has another library than the one that is chosen.
     """
+    domain = _with_chosen_skills(choice)
+    if not choice.measured:
+        return domain
+    from slap_ros.core.domain import MEASURED
+
+    return _configured(domain, MEASURED)
+
+
+def _with_chosen_skills(choice: DomainChoice) -> Domain:
     domain = _with_own_skills(choice)
     library = _library(choice, domain)
     if library is not None:
@@ -233,5 +245,11 @@ def _library(choice: DomainChoice, domain: Domain) -> SkillLibrary | None:
     return library
 
 
-def _configured(domain: Domain, said: dict[str, str]) -> Domain:
+def _is_measured(said: Mapping[str, str]) -> bool:
+    from slap_ros.core.domain import MEASURED
+
+    return MEASURED.items() <= said.items()
+
+
+def _configured(domain: Domain, said: Mapping[str, str]) -> Domain:
     return replace(domain, configuration={**domain.configuration, **said})

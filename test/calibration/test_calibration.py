@@ -24,6 +24,7 @@ from slap_ros.planning.execution import EpisodeResult, PlanExecution
 from slap_ros.planning.options import OptionResult, hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.relational import Target
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
 PRESET = "fair:obstacles=1,distractors=0"
 MODEL = get_domain("obstacle_tower", PRESET)  # what is planned with
@@ -39,11 +40,11 @@ def displacements(domain, moves):
     return list(actions)
 
 
-def sweep(state, speed):
+def sweep(state, speed, depth=0.005):
     """Where the arm begins, and its moves in each step, to sweep a block to the left."""
     block, robot = (state.layout.by_name[name] for name in ("block1", "robot"))
     x, y, z = (float(state.get(block, axis)) for axis in "xyz")
-    begin = from_above((x, y - 0.12, z - 0.005), 0.0)
+    begin = from_above((x, y - 0.12, z - depth), 0.0)
     now = np.array([float(state.get(robot, name)) for name in JOINTS])
     path = linear_motion(inverse_kinematics(begin, now), shifted(begin, (0.0, 0.14, 0.0)))
     along = np.cumsum([0.0, *(float(control_steps(a, b)) for a, b in pairwise(path))])
@@ -194,3 +195,37 @@ def test_what_moves_for_another_reason_is_refused(pushes):
     assert len(nothing) == 1
     with pytest.raises(InvalidParameterError, match="an end of the range"):
         identify_friction(MODEL, nothing)
+
+
+def pushed_by_a_robot(friction, seed):
+    """The same on a robot in MuJoCo, which stands still after every step."""
+    from slap_ros.robot.mujoco.closed_loop import ClosedLoopWorld
+
+    domain = get_domain("obstacle_tower", f"{PRESET},friction={friction}")
+    state, moves = sweep(domain.task(seed).initial_state, 0.9, depth=0.01)
+    world, actions = ClosedLoopWorld(domain, state), displacements(domain, moves)
+    states = [world.state, *(world.step(action) for action in actions)]
+    world.close()
+    return as_a_robot_says(states), actions
+
+
+@pytest.mark.slow
+def test_a_robot_that_rests_after_every_step_does_not_tell_friction():
+    pytest.importorskip("mujoco")
+    found = []
+    for friction in (0.9, 0.3):
+        recordings = [pushed_by_a_robot(friction, seed) for seed in (1, 2)]
+        pushes = [push for states, actions in recordings for push in find_pushes(states, actions)]
+        found.append(identify_friction(MODEL, pushes).friction)
+    assert found[0] == pytest.approx(found[1], abs=0.2)
+
+
+def test_a_bag_of_a_robot_is_refused(pushes, tmp_path):
+    states, actions = pushes[0]
+    measured = open_domain(DomainChoice("obstacle_tower", PRESET, measured=True))
+    output = tmp_path / "mine.yaml"
+    bag = recorded(tmp_path / "bag", measured, as_a_robot_says(states), actions)
+    result = calibrate(bag, "--output", output)
+    assert result.exit_code == InvalidParameterError.code
+    assert "stands still after every step" in " ".join(result.stderr.split())
+    assert not output.exists()

@@ -6,6 +6,7 @@ What may depend on the robot is tried on the mock robot and on the one in MuJoCo
 """
 
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -27,13 +28,15 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest, run
 from ensemble.spinner import temporary_node
-from slap_ros.bags import evaluate_bag, read_bag
+from slap_ros.bags import evaluate_bag, read_bag, replay_bag
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 from slap_ros.skills.domain_choice import DomainChoice
 from support.clocks import BY_THE_CLOCK, SettableClock
 from support.marks import slow
 
+SMALL = "fair:obstacles=1,distractors=0"  # of few abstract states
+IMPOSSIBLE = "(and (Holding robot block1) (GripperEmpty robot))"
 LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
 # All nodes share this process and a loaded machine's time: joint positions may be late.
 PATIENT = {"joint_timeout": 60.0, "controller_timeout": 60.0, "detection_timeout": 60.0}
@@ -156,6 +159,18 @@ def test_the_ensemble_solves_a_task_on_a_mock_robot(network, tmp_path):
     found = evaluate_bag(bag)
     assert found.runs[0].plan_length == metrics.plan_length
     assert found.states == metrics.plan_length + 1
+
+
+def test_where_there_is_no_plan_the_robot_looks_again_as_often_as_it_may_replan(network, tmp_path):
+    bag, small = tmp_path / "bag", DomainChoice("obstacle_tower", SMALL)
+    chosen = replace(settings(bridge=PATIENT, record=bag, goal=IMPOSSIBLE), domain=small)
+    request = RunRequest(chosen, timeout_s=LIMIT, max_replans=2, in_process=True)
+    metrics = run(request, lambda *_: None)
+    assert metrics.error_code == ErrorCode.REPLANS_EXHAUSTED
+    assert "diverged again after 2 replans: " in metrics.error_msg
+    assert (metrics.replans, metrics.plan_length) == (2, 2)  # a step for each look
+    with pytest.raises(InvalidParameterError, match="its states are measured"):
+        replay_bag(bag)
 
 
 @on_both_robots

@@ -18,6 +18,7 @@ from ensemble.client import RunClient
 from ensemble.interfaces import DOMAIN, JOINT_STATES, MARKERS, PLAN_EVENTS, STATE, TASK
 from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag, read_bag, replay_bag
+from slap_ros.errors import InvalidParameterError
 from support.commands import LIMIT, ros2, solve, started, wait_for_task
 
 ROOT = Path(__file__).parents[2]
@@ -33,6 +34,12 @@ EXECUTABLES = (
     "mock_robot",
 )
 NODES = EXECUTABLES[:4]
+PATIENT = """
+/**/mujoco_robot:
+  ros__parameters: {pace: 10.0}
+/**/robot_bridge:
+  ros__parameters: {controller_timeout: 60.0, joint_timeout: 60.0, detection_timeout: 60.0}
+"""
 
 
 def test_the_executables_of_the_page_are_there():
@@ -70,6 +77,23 @@ def test_a_launched_ensemble_solves_what_it_is_asked_for(cli, tmp_path, domain, 
         assert replay_bag(tmp_path / bag).identical
     if domain == "obstacle_tower":
         check_playing(tmp_path / "ours")
+
+
+def test_a_launched_robot_in_mujoco_does_what_it_is_asked_for(cli, tmp_path):
+    """A given goal, and a bag whose states are measured: no world repeats them."""
+    pytest.importorskip("mujoco")
+    patient = tmp_path / "patient.yaml"  # for a loaded machine
+    patient.write_text(PATIENT)
+    launch = ["ros2", "launch", "slap_ros", "ensemble.launch.py", "domain:=obstacle_tower"]
+    launch += ["seed:=1", "world:=mujoco", "goal:=(Holding robot block4)", "shortcuts:=none"]
+    launch += [f"record:={tmp_path / 'bag'}", "patience:=5.0", f"params_file:={patient}"]
+    with started(launch, tmp_path / "launch.txt"):
+        plan_length = solve()
+        ros2("service", "call", "/slap/close_bag", "std_srvs/srv/Trigger")
+    assert plan_length < 30  # the top block is picked up, no more
+    assert evaluate_bag(tmp_path / "bag").runs[-1].plan_length == plan_length
+    with pytest.raises(InvalidParameterError, match="its states are measured"):
+        replay_bag(tmp_path / "bag")
 
 
 def check_playing(bag):

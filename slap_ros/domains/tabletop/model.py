@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slap_ros.core import Display, Domain, Execution, Goal, Learning, Skill, Task
+from slap_ros.domains.tabletop.lifting import lifting
 from slap_ros.domains.tabletop.presets import TIMINGS, ArmSettings
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.timing import Timing
@@ -96,6 +97,7 @@ def tabletop_domain(
         execution=Execution(
             control_period_s=CONTROL_PERIOD_S,
             settle=settling(model.scene_of),
+            lift=lifting(model.scene_of),
         ),
         display=Display(
             bodies=lambda state: visible_bodies(model.scene_of(state), state),

@@ -41,17 +41,17 @@ def held_body(state: State) -> Object | None:
 
 def joints_of(state: State) -> Joints:
     """Joint positions, rad, shape (7,)."""
-    return np.array(_features(state, _robot(state), JOINT_NAMES))
+    return np.array(_features(state, robot_of(state), JOINT_NAMES))
 
 
 def finger_of(state: State) -> float:
     """Distance of each finger from the middle."""
-    return float(state.get(_robot(state), "finger"))
+    return float(state.get(robot_of(state), "finger"))
 
 
 def grasp_of(state: State) -> Pose:
     """The held body's pose seen from the grasp point."""
-    x, y, z, qx, qy, qz, qw = _features(state, _robot(state), GRASP_NAMES)
+    x, y, z, qx, qy, qz, qw = _features(state, robot_of(state), GRASP_NAMES)
     return Pose((x, y, z - GRASP_POINT), (qx, qy, qz, qw))
 
 
@@ -74,7 +74,8 @@ def yaw_of(pose: Pose) -> float:
     return math.atan2(y, x)
 
 
-def _robot(state: State) -> Object:
+def robot_of(state: State) -> Object:
+    """The only robot."""
     (robot,) = state.layout.of_type(ROBOT)
     return robot
 
