@@ -84,4 +84,6 @@ def test_a_skill_needs_what_the_others_of_its_plan_leave_to_it():
     assert solved.needed(0.81, ["Pick"]) == pytest.approx((0.81 / (6 / 7) ** 2) ** 0.5)
     assert solved.needed(0.81, ["Pick", "Put"]) == pytest.approx(0.81**0.25)
     solved.carried_out(0, [rollout(0, 0)])
-    assert solved.needed(0.8, ["Pick"]) > 1.0  # Put was never tried
+    assert solved.needed(0.81, ["Pick"]) == pytest.approx(0.81**0.25)  # Put was never tried
+    solved.carried_out(0, [rollout(0, 1)])
+    assert solved.needed(0.81, ["Pick"]) > 1.0  # Put never succeeds

@@ -83,6 +83,8 @@ class SolvedShares:
     def needed(self, share: float, skills: Collection[str]) -> float:
         """The success that each of some skills needs, so that a share of tasks is solved.
 
+        Skills that no plan has come to yet will need the same.
+
         Args:
             share: Share of tasks to solve.
             skills: Operators of the skills that are to be learned; others stay as they are.
@@ -90,8 +92,9 @@ class SolvedShares:
         Returns:
             The same for all of them; above 1 where it does not depend on them alone.
         """
-        own = sum(self._stages[name] for name in skills)
-        others = self._product([name for name in self._stages if name not in skills])
+        settled = [name for name in self._success if name not in skills]
+        others = self._product(settled)
+        own = sum(count for name, count in self._stages.items() if name not in settled)
         return (share / others) ** (1.0 / own) if own and others else math.inf
 
     def _product(self, skills: Collection[str]) -> float:
