@@ -81,11 +81,19 @@ class Sloppy:
         raise AssertionError("never run: the model below knows the outcome")
 
 
-class SloppyModel:
+class WholeModel:
+    """Nothing is known of a roll-out before its end."""
+
+    executed = 0
+
+    def raised_bound(self, option, state, target, steps):
+        return steps
+
+
+class SloppyModel(WholeModel):
     """Ends with other atoms than were expected; it is the target that says whether it did."""
 
     space = SimpleNamespace(decode=lambda mask: (), abstract=lambda state: 0)
-    executed = 0
 
     def roll_out(self, option, state, target):
         steps, more, lost = option.skill.outcome(state)
@@ -243,11 +251,10 @@ class Failing(Sloppy):
     ends: int = 0
 
 
-class FailingModel:
+class FailingModel(WholeModel):
     """What options end in is what they say."""
 
     space = SimpleNamespace(decode=lambda mask: (), abstract=lambda state: int(state.data[0]))
-    executed = 0
 
     def roll_out(self, option, state, target):
         ends, steps = option.skill.ends, option.skill.seed
