@@ -45,11 +45,11 @@ def test_sac_takes_a_block_by_the_stages_of_its_plan(tmp_path):
     assert success("sac", EASY, HOLDING, 2_000, changes, tmp_path) >= 0.5
 
 
-@pytest.mark.slow  # 1,100 updates of actor and critics
+@pytest.mark.slow  # 2,100 updates of actor and critics; with half of them, one processor got .45
 @pytest.mark.training
 @pytest.mark.timeout(300)
 def test_sac_with_hindsight_takes_a_block(tmp_path):
-    assert success("sac-her", EASY, HOLDING, 3_000, QUICK_SAC, tmp_path) >= 0.5
+    assert success("sac-her", EASY, HOLDING, 5_000, QUICK_SAC, tmp_path) >= 0.5
 
 
 @pytest.mark.slow  # 6,000 environment steps, one after the other
