@@ -13,7 +13,7 @@ UV_INSTALL := UV_FIND_LINKS="$$PIP_FIND_LINKS" UV_DEFAULT_INDEX="$$PIP_INDEX_URL
 install_packages = $(UV_INSTALL) $(1) || $(PIP_INSTALL) $(1)
 NOT_COMPILED := /tests?/|/(pip|pkg_resources|pybullet_envs|pybullet_examples|pygments|setuptools)/|$\
   /(debugpy|devtools|docutils|fontTools|mypy|mypyc|OpenGL|sympy/physics)/|$\
-  /openai/(resources|types)/|/torch/(_dynamo|_inductor|distributed|onnx|testing)/
+  /openai/(resources|types)/|/torch/(_inductor|distributed|onnx|testing)/
 COMPILE_LIBRARIES := $(BIN)/python -m compileall -qq -j 0 -x '$(NOT_COMPILED)' $(VENV)/lib || true  # some have files of other Pythons
 # No test should wait until motion planning is compiled. Half a second where it is.
 COMPILE_MOTION := $(BIN)/python -m slap_ros.motion.kernels
@@ -33,7 +33,7 @@ install: $(VENV)/.installed  ## Make .venv with everything that running needs
 $(VENV)/.installed: $(METADATA)
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || \
 	  { echo "slap_ros needs Python 3.11 or 3.12; try: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
-	@echo "== setting up $(VENV), which takes about two minutes"
+	@echo "== setting up $(VENV), which takes about a minute"
 	$(PYTHON) -m venv $(VENV) || \
 	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(PIP_INSTALL) uv

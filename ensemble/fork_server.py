@@ -39,12 +39,24 @@ def main() -> int:
         # A node whose import fails tries it again, and says so as it would in any process.
         with suppress(Exception):
             import_module(f"{name}.node")
+    if "ensemble.interfaces" in sys.modules:  # at least one of them is on the network
+        _prepare_types()
     gc.freeze()  # else the first collection in a node writes to, and so copies, all pages
     arguments = _serve(answers)
     if arguments is None:
         return 0
     sys.argv = [*arguments]
     return main_of(arguments[0])
+
+
+def _prepare_types() -> None:
+    from ensemble.interfaces import CALLED, RECORDED
+    from ensemble.network import is_embedded
+
+    if is_embedded():  # ROS 2's own has them compiled
+        from embedded_ros.preparation import prepare
+
+        prepare(one.type for one in (*RECORDED, *CALLED))
 
 
 def die_with_parent() -> None:

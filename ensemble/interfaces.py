@@ -150,3 +150,13 @@ EXECUTE_SKILL = Call("slap/execute_skill", ExecuteSkill)
 PROPOSE_OPERATORS = Call("slap/propose_operators", ProposeOperators)
 ACQUIRE_SKILLS = Call("slap/acquire_skills", AcquireSkills)
 GROW_SKILLS = Call("slap/grow_skills", GrowSkills)
+CALLED = (
+    RESET_TASK,
+    LIST_SKILLS,
+    CLOSE_BAG,
+    SOLVE_TASK,
+    EXECUTE_SKILL,
+    PROPOSE_OPERATORS,
+    ACQUIRE_SKILLS,
+    GROW_SKILLS,
+)

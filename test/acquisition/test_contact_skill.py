@@ -41,7 +41,7 @@ def test_a_hammer_is_grasped_after_a_minute_of_learning(tmp_path):
         states = InitiationStates(starts, ()), InitiationStates(fresh, ())
         job = jobs.LearningJob(SOURCE, "Pick", 0, *states, settings, tmp_path)
         ((_, outcome),) = workers.run(jobs.learn, [(job,)])
-        ((_, vacuity),) = workers.run(jobs.vacuity, [(SOURCE, "Pick", fresh, 8)])
+        ((_, vacuity),) = workers.run(jobs.vacuity, [(SOURCE, "Pick", fresh, 2)])
     assert outcome["initial"] <= 0.1
     assert outcome["segments"][outcome["best"] - 1] >= 0.9
     assert vacuity["success"] <= 0.1

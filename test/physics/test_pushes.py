@@ -19,7 +19,7 @@ from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN, HOME, MAX_STEP
 from support.transitions import HIGH, holding
 
-PUSHES = 40  # of the 200 that benchmarks/physics_step.py --pushes 200 compares
+PUSHES = 25  # of the 200 that benchmarks/physics_step.py --pushes 200 compares
 FASTEST = 6.0  # m/s; falling to the floor gives 3
 DEEPEST = 0.022  # m; a body may be let go of 2 cm inside the table
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from embedded_ros.preparation import PARAMETER_SERVICES
 from embedded_ros.types import message_class, service_class
 
 from .callback_groups import CallbackGroup
@@ -25,22 +26,22 @@ class ParameterService:
         self._node = node
         group: CallbackGroup = node.default_callback_group
         handlers = {
-            "describe_parameters": ("DescribeParameters", self._describe),
-            "get_parameters": ("GetParameters", self._get),
-            "get_parameter_types": ("GetParameterTypes", self._get_types),
-            "list_parameters": ("ListParameters", self._list),
-            "set_parameters": ("SetParameters", self._set),
-            "set_parameters_atomically": ("SetParametersAtomically", self._set_atomically),
+            "describe_parameters": self._describe,
+            "get_parameters": self._get,
+            "get_parameter_types": self._get_types,
+            "list_parameters": self._list,
+            "set_parameters": self._set,
+            "set_parameters_atomically": self._set_atomically,
         }
         self.services: list[Service[Any]] = [
             node.create_service(
-                service_class(f"rcl_interfaces/srv/{type_name}"),
+                service_class(f"rcl_interfaces/srv/{PARAMETER_SERVICES[name]}"),
                 f"~/{name}",
                 handler,
                 qos_profile=qos_profile_parameters,
                 callback_group=group,
             )
-            for name, (type_name, handler) in handlers.items()
+            for name, handler in handlers.items()
         ]
 
     def _describe(self, request: Any, response: Any) -> Any:
