@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -221,6 +222,41 @@ def _apart(places: Array) -> Array:
     return apart
 
 
+class Step(Protocol):
+    """See :func:`step`."""
+
+    def __call__(
+        self, layout: Layout, data: Array, actions: Array, tolerance: GraspTolerance
+    ) -> Array:
+        """The next states."""
+        ...
+
+
+@cache
+def fastest_step() -> Step:
+    """The step of many worlds: compiled code where numba can be imported, else :func:`step`.
+
+    Both have the same bits. For a single world, to import numba would take longer than it saves.
+    """
+    try:
+        from slap_ros.domains.obstacle2d import kernels
+    except ImportError:
+        return step
+
+    def compiled(layout: Layout, data: Array, actions: Array, tolerance: GraspTolerance) -> Array:
+        columns = _columns(layout)
+        sizes = kernels.Sizes(BLOCK_SIZE, CONTACT, ROUNDING, tolerance.reach, tolerance.gap)
+        return kernels.step(
+            data,
+            np.array(actions, dtype=np.float64, order="C"),
+            (columns.robot, columns.x, columns.y, columns.held),
+            (CLOSE, OPEN),
+            sizes,
+        )
+
+    return compiled
+
+
 class Obstacle2DVectorWorld:
     """Many worlds of the same objects, stepped by one computation."""
 
@@ -249,7 +285,7 @@ class Obstacle2DVectorWorld:
 
     def step(self, actions: Array) -> State:
         """Act in every world once; ``actions``: shape (worlds, 3)."""
-        self._data = step(self._layout, self._data, actions, self._tolerance)
+        self._data = fastest_step()(self._layout, self._data, actions, self._tolerance)
         return self.states
 
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from collections.abc import Callable
+from functools import cache, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +70,11 @@ class _Relations(NamedTuple):
 
 @cache_latest
 def _relations(state: State) -> _Relations:
+    """Of a state; or of many, by compiled code where numba can be imported: the same bits."""
+    return relations_by_numpy(state) if state.data.ndim == 1 else _of_many()(state)
+
+
+def relations_by_numpy(state: State) -> _Relations:
     """Only target areas can be overlapped; the table is simply what blocks lie on."""
     blocks, surfaces = state.layout.column_of(BLOCK), state.layout.column_of(SURFACE)
     rest = _rest_margin(state, blocks)
@@ -80,6 +86,30 @@ def _relations(state: State) -> _Relations:
     overlap = np.minimum(rest[..., None], reach)
     off_targets = strictly(-np.minimum(rest, reach.max(axis=-1)))
     return _Relations(rest, distance, overlap, np.minimum(rest, off_targets))
+
+
+@cache
+def _of_many() -> Callable[[State], _Relations]:
+    try:
+        from slap_ros.domains.obstacle2d import kernels
+    except ImportError:
+        return relations_by_numpy
+    tolerances = kernels.RelationConstants(
+        BLOCK_SIZE, RESTING_TOLERANCE, OVERLAP_TOLERANCE, STEEPNESS
+    )
+
+    def compiled(state: State) -> _Relations:
+        layout = state.layout
+        blocks, surfaces = layout.column_of(BLOCK), layout.column_of(SURFACE)
+        found = kernels.relations(
+            np.array(state.data),  # that may be changed: numba compiles for either
+            tuple(layout.indices(blocks, name) for name in ("x", "y", "held")),
+            tuple(layout.indices(surfaces, name) for name in ("x", "width", "is_target")),
+            tolerances,
+        )
+        return _Relations(*found)
+
+    return compiled
 
 
 def _numbers(state: State, column: Column, kind: Type) -> NDArray[np.intp]:
