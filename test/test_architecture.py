@@ -37,6 +37,7 @@ FLOORS = (
     ("relational", "meshes", "vision", "geometry"),
     (
         "compilation",
+        "tiered_function",
         "versions",
         "files",
         "signals",

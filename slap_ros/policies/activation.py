@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.portable_math import on_grid, tanh, tanh_on_grid
+from slap_ros.tiered_function import TieredFunction
 
 Values = NDArray[np.float64]
 # From sums of both parts of a layer, side by side, shape (n, 2 * size), and its bias, shape
@@ -30,24 +30,21 @@ def tanh_of_sums(sums: Values, bias: Values) -> Values:
     return tanh_on_grid(outputs_of_sums(sums, bias))
 
 
-@cache
-def _fastest_tanh() -> OfSums:
-    """Compiled code where numba can be imported, else numpy: the same to the bit."""
-    try:
-        from slap_ros.policies.kernels import tanh_of_sums as compiled_tanh
-    except ImportError:
-        return tanh_of_sums
-    return compiled_tanh
+def _compiled_tanh() -> OfSums:
+    from slap_ros.policies import kernels
+
+    return kernels.tanh_of_sums
 
 
 def _relu(values: Values) -> Values:
     return np.maximum(values, 0.0)
 
 
+TANH_OF_SUMS: TieredFunction[OfSums] = TieredFunction(tanh_of_sums, _compiled_tanh)
 # Each rises with its argument, so that the largest argument gives the largest result.
 ACTIVATIONS: Mapping[str, Callable[[Values], Values]] = {"tanh": tanh, "relu": _relu}
 # The same of sums, rounded to the grid.
 OF_SUMS: Mapping[str, OfSums] = {
-    "tanh": lambda sums, bias: _fastest_tanh()(sums, bias),
+    "tanh": lambda sums, bias: TANH_OF_SUMS.of(len(sums))(sums, bias),
     "relu": lambda sums, bias: on_grid(_relu(outputs_of_sums(sums, bias))),
 }

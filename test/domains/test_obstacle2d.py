@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.obstacle2d.dynamics import GRASP_TOLERANCE, fastest_step, step
+from slap_ros.domains.obstacle2d.dynamics import GRASP_TOLERANCE, STEP_OF_MANY, step
 from slap_ros.domains.obstacle2d.model import (
     BLOCK,
     BLOCK_SIZE,
+    RELATIONS_OF_MANY,
     ROBOT,
-    _of_many,
     relations_by_numpy,
 )
 from slap_ros.domains.obstacle2d.tasks import make_task
@@ -112,7 +112,7 @@ def test_replaying_any_state_gives_the_next_bit_for_bit():
         assert FAIR.make_world(state).step(action).key == after.key
 
 
-@pytest.mark.parametrize("together", [step, fastest_step()])
+@pytest.mark.parametrize("together", [step, STEP_OF_MANY.compiled()])
 def test_a_batch_steps_like_its_worlds_one_by_one(together):
     for seed in range(3, 8):  # in which blocks are pushed, grasped, carried and let go
         states, actions = random_walk(seed)
@@ -125,7 +125,7 @@ def test_a_batch_steps_like_its_worlds_one_by_one(together):
 def test_relations_of_many_states_have_the_bits_of_each():
     for seed in range(3):
         states, _ = random_walk(seed)
-        together = _of_many()(State.batch(states))
+        together = RELATIONS_OF_MANY.compiled()(State.batch(states))
         for i, state in enumerate(states):
             for of_all, of_one in zip(together, relations_by_numpy(state), strict=True):
                 assert of_all[i].tobytes() == of_one.tobytes()

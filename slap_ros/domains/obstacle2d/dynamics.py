@@ -10,10 +10,9 @@ a carried block is let go only over free table, and then stands there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from typing import Protocol
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, ROBOT, X, Y
 from slap_ros.errors import InvalidStateError
 from slap_ros.relational import Feature, Layout, State
 from slap_ros.relational.state import Array
+from slap_ros.tiered_function import TieredFunction
 
 MAX_STEP = 0.1  # m, displacement along each axis in one step
 ACTION_SPACE = ActionSpace(
@@ -222,26 +222,12 @@ def _apart(places: Array) -> Array:
     return apart
 
 
-class Step(Protocol):
-    """See :func:`step`."""
-
-    def __call__(
-        self, layout: Layout, data: Array, actions: Array, tolerance: GraspTolerance
-    ) -> Array:
-        """The next states."""
-        ...
+StepOfMany = Callable[[Layout, Array, Array, GraspTolerance], Array]  # as step has them
 
 
-@cache
-def fastest_step() -> Step:
-    """The step of many worlds: compiled code where numba can be imported, else :func:`step`.
-
-    Both have the same bits. For a single world, to import numba would take longer than it saves.
-    """
-    try:
-        from slap_ros.domains.obstacle2d import kernels
-    except ImportError:
-        return step
+def _compiled_step() -> StepOfMany:
+    """The step of many worlds by compiled code; see :func:`step`."""
+    from slap_ros.domains.obstacle2d import kernels
 
     def compiled(layout: Layout, data: Array, actions: Array, tolerance: GraspTolerance) -> Array:
         columns = _columns(layout)
@@ -255,6 +241,9 @@ def fastest_step() -> Step:
         )
 
     return compiled
+
+
+STEP_OF_MANY: TieredFunction[StepOfMany] = TieredFunction(step, _compiled_step)
 
 
 class Obstacle2DVectorWorld:
@@ -285,7 +274,8 @@ class Obstacle2DVectorWorld:
 
     def step(self, actions: Array) -> State:
         """Act in every world once; ``actions``: shape (worlds, 3)."""
-        self._data = fastest_step()(self._layout, self._data, actions, self._tolerance)
+        step_all = STEP_OF_MANY.of(len(self._data))
+        self._data = step_all(self._layout, self._data, actions, self._tolerance)
         return self.states
 
 

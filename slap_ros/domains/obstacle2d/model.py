@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from slap_ros.relational import (
 )
 from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
+from slap_ros.tiered_function import TieredFunction
 
 BLOCK_SIZE = 0.2  # m, width and height of every block and of the robot's gripper
 OVERLAP_TOLERANCE = 1e-3  # m, how far a block may reach over an area's edge without overlapping it
@@ -70,8 +71,10 @@ class _Relations(NamedTuple):
 
 @cache_latest
 def _relations(state: State) -> _Relations:
-    """Of a state; or of many, by compiled code where numba can be imported: the same bits."""
-    return relations_by_numpy(state) if state.data.ndim == 1 else _of_many()(state)
+    """Of a state, or of many, which compiled code may compute: the same bits."""
+    if state.data.ndim != 2:
+        return relations_by_numpy(state)
+    return RELATIONS_OF_MANY.of(len(state.data))(state)
 
 
 def relations_by_numpy(state: State) -> _Relations:
@@ -88,12 +91,10 @@ def relations_by_numpy(state: State) -> _Relations:
     return _Relations(rest, distance, overlap, np.minimum(rest, off_targets))
 
 
-@cache
-def _of_many() -> Callable[[State], _Relations]:
-    try:
-        from slap_ros.domains.obstacle2d import kernels
-    except ImportError:
-        return relations_by_numpy
+def _compiled_relations() -> Callable[[State], _Relations]:
+    """The relations of many states by compiled code."""
+    from slap_ros.domains.obstacle2d import kernels
+
     tolerances = kernels.RelationConstants(
         BLOCK_SIZE, RESTING_TOLERANCE, OVERLAP_TOLERANCE, STEEPNESS
     )
@@ -110,6 +111,11 @@ def _of_many() -> Callable[[State], _Relations]:
         return _Relations(*found)
 
     return compiled
+
+
+RELATIONS_OF_MANY: TieredFunction[Callable[[State], _Relations]] = TieredFunction(
+    relations_by_numpy, _compiled_relations
+)
 
 
 def _numbers(state: State, column: Column, kind: Type) -> NDArray[np.intp]:
