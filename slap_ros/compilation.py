@@ -13,6 +13,7 @@ before a change, and processors that share a home would overwrite each other's c
 from __future__ import annotations
 
 import fcntl
+import importlib
 import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -24,6 +25,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from llvmlite import binding
+from numba.np import linalg
 
 from slap_ros.files import user_cache
 
@@ -44,6 +46,23 @@ logger = logging.getLogger(__name__)
 
 if _config.DISABLE_JIT:  # these functions as plain Python are slower than numpy
     raise ImportError("numba compiles nothing: NUMBA_DISABLE_JIT is set")
+
+
+def _load_without_blas() -> None:
+    """Let numba load its array functions, for which it would import scipy for a third of a second.
+
+    scipy has the matrix products that numba knows. No compiled function calls them.
+    """
+
+    def nothing() -> None:
+        raise ImportError
+
+    look_for_blas, linalg.ensure_blas = linalg.ensure_blas, nothing
+    importlib.import_module("numba.np.arraymath")
+    linalg.ensure_blas = look_for_blas
+
+
+_load_without_blas()
 
 
 def inner(function: Function) -> Function:
