@@ -35,7 +35,17 @@ FLOORS = (
     ("worlds",),
     ("core",),
     ("relational", "meshes", "vision", "geometry"),
-    ("versions", "files", "signals", "portable_math", "redaction", "errors", "slap_ros"),
+    (
+        "compilation",
+        "tiered_function",
+        "versions",
+        "files",
+        "signals",
+        "portable_math",
+        "redaction",
+        "errors",
+        "slap_ros",
+    ),
 )
 ORDER = [package for floor in FLOORS for package in floor]
 ROS = re.compile(r"rclpy|embedded_ros|cyclonedds|launch(_ros)?|rosidl_.*|\w+_(msgs|interfaces)$")

@@ -159,7 +159,7 @@ OWN = {
     "domains/registry.py",
     "files.py",
     "messages/typestore.py",
-    "motion/kernels/compilation.py",
+    "compilation.py",
     "report/page.py",
 }
 

@@ -23,6 +23,7 @@ from safetensors.numpy import save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError, InvalidStateError
+from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.library_files import (
     load_policy,
     policy_tensors,
@@ -31,7 +32,7 @@ from slap_ros.policies.library_files import (
     save_policy,
     write_object,
 )
-from slap_ros.policies.mlp_policy import ACTIVATIONS, MlpPolicy
+from slap_ros.policies.mlp_policy import MlpPolicy
 
 FORMAT = 1
 BASELINE, POLICY = "baseline.json", "policy.safetensors"

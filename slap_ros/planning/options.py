@@ -198,11 +198,14 @@ class OptionExecution:
     steps: int = 0
     expected_steps: int = 0
     _policy: Policy = field(init=False, repr=False)
+    _foreseeing: ForeseeingPolicy | None = field(init=False, repr=False)  # the same, if it is one
     _held_steps: int = field(default=0, init=False)  # at its end
     _start: int | None = field(default=None, init=False)  # the abstract state in which it begins
 
     def __post_init__(self) -> None:
-        self._policy = self.option.skill.start(self.state, self.option.objects)
+        policy = self.option.skill.start(self.state, self.option.objects)
+        self._policy = policy
+        self._foreseeing = policy if isinstance(policy, ForeseeingPolicy) else None
 
     def advance(
         self, state: State, abstract: int, missing: Collection[str] = ()
@@ -243,7 +246,7 @@ class OptionExecution:
     @property
     def foreseen(self) -> State | None:
         """The state after the newest action in the model; None where the policy does not know."""
-        return self._policy.foreseen if isinstance(self._policy, ForeseeingPolicy) else None
+        return None if self._foreseeing is None else self._foreseeing.foreseen
 
     @property
     def _step_limit(self) -> int:

@@ -17,9 +17,9 @@ class ActionMap:
         """Map to a domain's axes; ``gripper`` says whether the policy commands a gripper too."""
         space = domain.learned_actions
         low, high = np.array(space.low), np.array(space.high)
-        self._middle, self._half = (low + high) / 2, (high - low) / 2
         self.axes = list(range(len(low)) if gripper else space.displacement_indices)
-        self.size = len(self.axes)
+        self.size, self._all = len(self.axes), len(low)
+        self._middle, self._half = ((low + high) / 2)[self.axes], ((high - low) / 2)[self.axes]
 
     def places_of(self, fewer: ActionMap) -> list[int]:
         """Where the axes of a map that commands no more than this one are among its own."""
@@ -27,7 +27,7 @@ class ActionMap:
 
     def __call__(self, actions: Array) -> Array:
         """The robot's actions, shape (..., axes); one that is not commanded is 0."""
-        mapped = np.zeros((*actions.shape[:-1], len(self._middle)))
-        scaled = self._half[self.axes] * np.clip(actions, -1.0, 1.0)
-        mapped[..., self.axes] = self._middle[self.axes] + scaled
+        mapped = np.zeros((*actions.shape[:-1], self._all))
+        scaled = self._half * np.minimum(np.maximum(actions, -1.0), 1.0)
+        mapped[..., self.axes] = self._middle + scaled
         return mapped

@@ -19,10 +19,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.policies.activation import outputs_of_sums
 from slap_ros.portable_math import RESOLUTION
 
 Values = NDArray[np.float64]
 MANTISSA_BITS = 53  # bits of a 64-bit float's mantissa
+# Largest number of rows of a product. OpenBLAS spreads larger ones over threads, which wait for one
+# another where cores are busy.
+MAX_ROWS = 64
 PARTS = 2  # parts of the weights: with two, the sums are as good as those of 64-bit floats
 
 
@@ -68,10 +72,18 @@ class ExactLayer:
         Args:
             inputs: Inputs, multiples of ``RESOLUTION`` within the bound, shape (n, in).
         """
-        both = inputs @ self._side_by_side
-        outputs: Values = both[:, : len(self.bias)] + both[:, len(self.bias) :]
-        outputs += self.bias
-        return outputs
+        return outputs_of_sums(self.sums(inputs), self.bias)
+
+    def sums(self, inputs: Values) -> Values:
+        """Products of inputs with both parts, side by side, shape (n, 2 * out).
+
+        Args:
+            inputs: Inputs, multiples of ``RESOLUTION`` within the bound, shape (n, in).
+        """
+        sums = np.empty((len(inputs), 2 * len(self.bias)))
+        for i in range(0, len(inputs), MAX_ROWS):
+            np.matmul(inputs[i : i + MAX_ROWS], self._side_by_side, out=sums[i : i + MAX_ROWS])
+        return sums
 
     @cached_property
     def _side_by_side(self) -> Values:

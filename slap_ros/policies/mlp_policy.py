@@ -9,7 +9,7 @@ defined to the bit. So a state has the same action on every processor.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -17,13 +17,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.policies.activation import ACTIVATIONS, OF_SUMS
 from slap_ros.policies.exact_layer import ExactLayer
-from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh, tanh_on_grid
+from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh_on_grid
 
 LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
-# Largest number of observations at once. OpenBLAS spreads larger products over threads, which
-# wait for one another where cores are busy.
-MAX_BATCH = 64
 Weights = NDArray[np.float32]
 Values = NDArray[np.float64]
 
@@ -48,19 +46,6 @@ class SampledPolicy(Protocol):
             temperature: Scale of the noise, a number or of shape (n, 1); 0 for no noise.
         """
         ...
-
-
-def _relu(values: Values) -> Values:
-    return np.maximum(values, 0.0)
-
-
-# Each rises with its argument, so that the largest argument gives the largest result.
-ACTIVATIONS: Mapping[str, Callable[[Values], Values]] = {"tanh": tanh, "relu": _relu}
-# The same, rounded to the grid.
-ON_GRID: Mapping[str, Callable[[Values], Values]] = {
-    "tanh": tanh_on_grid,
-    "relu": lambda values: on_grid(_relu(values)),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,15 +102,10 @@ class MlpPolicy:
 
     def mean(self, observations: Weights) -> Weights:
         """The most likely actions, shape (n, actions), not yet clipped to [-1, 1]."""
-        rows = range(0, max(len(observations), 1), MAX_BATCH)
-        return np.concatenate([self._mean(observations[i : i + MAX_BATCH]) for i in rows])
-
-    def _mean(self, observations: Weights) -> Weights:
-        activate = ON_GRID[self.activation]
         *hidden, last = self._exact_layers
         values = on_grid(self.normalisation(observations).astype(np.float64))
         for layer in hidden:
-            values = activate(layer(values))
+            values = OF_SUMS[self.activation](layer.sums(values), layer.bias)
         actions = last(values)
         rounded = tanh_on_grid(actions) if self.squashed else on_grid(actions)
         return rounded.astype(np.float32)

@@ -142,8 +142,11 @@ class RolloutBatch:
             self._worlds = self._begin()
         actions = self._act(self.steps, self._encoding)
         self._past.append((self.states, actions))
-        self._alive &= ~np.isnan(actions).any(axis=-1)  # a damaged policy may give no number
-        commands = self._encoder.action_map(np.nan_to_num(actions).astype(np.float64))
+        broken = np.isnan(actions).any(axis=-1)
+        if broken.any():  # a damaged policy may give no number
+            self._alive &= ~broken
+            actions = np.nan_to_num(actions)
+        commands = self._encoder.action_map(actions.astype(np.float64))
         self.states = self._worlds.step(commands)
         self._encoding = encoding = self._encoder.encode(self.states)
         success = self._alive & self._encoder.success(self.states, encoding, self._targets)

@@ -29,6 +29,7 @@ from safetensors.numpy import save
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError, InvalidLibraryError, InvalidRewardError
 from slap_ros.policies.action_map import ActionMap
+from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.library_files import (
     SKILL,
     load_policy,
@@ -41,7 +42,7 @@ from slap_ros.policies.library_files import (
     write_library,
     write_object,
 )
-from slap_ros.policies.mlp_policy import ACTIVATIONS, MlpPolicy
+from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.relational import LiftedOperator, RewardTemplate
 from slap_ros.skills.observations import SIZE
 from slap_ros.skills.operator_json import operator_data, read_operator, read_template, template_data

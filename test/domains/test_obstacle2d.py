@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.obstacle2d.dynamics import step
-from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, ROBOT
+from slap_ros.domains.obstacle2d.dynamics import GRASP_TOLERANCE, STEP_OF_MANY, step
+from slap_ros.domains.obstacle2d.model import (
+    BLOCK,
+    BLOCK_SIZE,
+    RELATIONS_OF_MANY,
+    ROBOT,
+    relations_by_numpy,
+)
 from slap_ros.domains.obstacle2d.tasks import make_task
 from slap_ros.errors import (
     InvalidCommandError,
@@ -106,12 +112,23 @@ def test_replaying_any_state_gives_the_next_bit_for_bit():
         assert FAIR.make_world(state).step(action).key == after.key
 
 
-def test_a_batch_steps_like_its_worlds_one_by_one():
-    states, actions = random_walk(3)
-    layout = states[0].layout
-    batch = step(layout, np.stack([s.data for s in states[:-1]]), np.stack(actions))
-    for row, after in zip(batch, states[1:], strict=True):
-        assert row.tobytes() == after.key
+@pytest.mark.parametrize("together", [step, STEP_OF_MANY.compiled()])
+def test_a_batch_steps_like_its_worlds_one_by_one(together):
+    for seed in range(3, 8):  # in which blocks are pushed, grasped, carried and let go
+        states, actions = random_walk(seed)
+        layout, before = states[0].layout, np.stack([s.data for s in states[:-1]])
+        batch = together(layout, before, np.stack(actions), GRASP_TOLERANCE)
+        for row, after in zip(batch, states[1:], strict=True):
+            assert row.tobytes() == after.key
+
+
+def test_relations_of_many_states_have_the_bits_of_each():
+    for seed in range(3):
+        states, _ = random_walk(seed)
+        together = RELATIONS_OF_MANY.compiled()(State.batch(states))
+        for i, state in enumerate(states):
+            for of_all, of_one in zip(together, relations_by_numpy(state), strict=True):
+                assert of_all[i].tobytes() == of_one.tobytes()
 
 
 def test_a_push_moves_a_chain_up_to_the_wall():

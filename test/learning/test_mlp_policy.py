@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from slap_ros.policies.activation import tanh_of_sums
 from slap_ros.policies.exact_layer import ExactLayer
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.portable_math import on_grid
@@ -74,3 +75,15 @@ def test_the_sums_of_a_layer_are_exact_in_any_order(scale):
             one_by_one += inputs[:, i : i + 1] * part[i]
         assert one_by_one.tobytes() == (inputs @ part).tobytes()
     np.testing.assert_allclose(layer(inputs), inputs @ weights.T.astype(float), atol=1e-10 * scale)
+
+
+def test_compiled_activation_has_the_bits_of_numpy():
+    kernels = pytest.importorskip("slap_ros.policies.kernels")
+    rng = np.random.default_rng(5)
+    bias = rng.normal(size=40)
+    sums = rng.normal(0.0, 10.0 ** rng.uniform(-8.0, 2.0, (200, 1)), (200, 80))
+    sums[0], bias[0] = 0.0, -0.0
+    sums[1, :40] = on_grid(sums[1, :40])
+    sums[2] = np.nan
+    found, expected = kernels.tanh_of_sums(sums, bias), tanh_of_sums(sums, bias)
+    assert found.tobytes() == expected.tobytes()

@@ -224,7 +224,7 @@ def test_where_numba_is_told_to_compile_nothing_numpy_computes():
 def test_where_no_cache_can_be_written_code_is_compiled_again():
     program = """
 import numpy as np
-from slap_ros.motion.kernels.compilation import cache_folder
+from slap_ros.compilation import cache_folder
 from slap_ros.motion.kernels.kinematics import arm_frames
 assert cache_folder() is None
 print(arm_frames(np.zeros((1, 7))).shape)
@@ -235,7 +235,7 @@ print(arm_frames(np.zeros((1, 7))).shape)
 
 PART = """
 from slap_ros.motion.kernels import trigonometry
-from slap_ros.motion.kernels.compilation import compile_once
+from slap_ros.compilation import compile_once
 compile_once([lambda: trigonometry.sin_cos(0.3)])
 print(*map(float.hex, trigonometry.sin_cos(0.3)))
 """

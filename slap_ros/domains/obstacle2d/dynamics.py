@@ -10,7 +10,7 @@ a carried block is let go only over free table, and then stands there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -22,6 +22,7 @@ from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, ROBOT, X, Y
 from slap_ros.errors import InvalidStateError
 from slap_ros.relational import Feature, Layout, State
 from slap_ros.relational.state import Array
+from slap_ros.tiered_function import TieredFunction
 
 MAX_STEP = 0.1  # m, displacement along each axis in one step
 ACTION_SPACE = ActionSpace(
@@ -221,6 +222,30 @@ def _apart(places: Array) -> Array:
     return apart
 
 
+StepOfMany = Callable[[Layout, Array, Array, GraspTolerance], Array]  # as step has them
+
+
+def _compiled_step() -> StepOfMany:
+    """The step of many worlds by compiled code; see :func:`step`."""
+    from slap_ros.domains.obstacle2d import kernels
+
+    def compiled(layout: Layout, data: Array, actions: Array, tolerance: GraspTolerance) -> Array:
+        columns = _columns(layout)
+        sizes = kernels.Sizes(BLOCK_SIZE, CONTACT, ROUNDING, tolerance.reach, tolerance.gap)
+        return kernels.step(
+            data,
+            np.array(actions, dtype=np.float64, order="C"),
+            (columns.robot, columns.x, columns.y, columns.held),
+            (CLOSE, OPEN),
+            sizes,
+        )
+
+    return compiled
+
+
+STEP_OF_MANY: TieredFunction[StepOfMany] = TieredFunction(step, _compiled_step)
+
+
 class Obstacle2DVectorWorld:
     """Many worlds of the same objects, stepped by one computation."""
 
@@ -249,7 +274,8 @@ class Obstacle2DVectorWorld:
 
     def step(self, actions: Array) -> State:
         """Act in every world once; ``actions``: shape (worlds, 3)."""
-        self._data = step(self._layout, self._data, actions, self._tolerance)
+        step_all = STEP_OF_MANY.of(len(self._data))
+        self._data = step_all(self._layout, self._data, actions, self._tolerance)
         return self.states
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from slap_ros.relational import (
 )
 from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
+from slap_ros.tiered_function import TieredFunction
 
 BLOCK_SIZE = 0.2  # m, width and height of every block and of the robot's gripper
 OVERLAP_TOLERANCE = 1e-3  # m, how far a block may reach over an area's edge without overlapping it
@@ -69,6 +71,13 @@ class _Relations(NamedTuple):
 
 @cache_latest
 def _relations(state: State) -> _Relations:
+    """Of a state, or of many, which compiled code may compute: the same bits."""
+    if state.data.ndim != 2:
+        return relations_by_numpy(state)
+    return RELATIONS_OF_MANY.of(len(state.data))(state)
+
+
+def relations_by_numpy(state: State) -> _Relations:
     """Only target areas can be overlapped; the table is simply what blocks lie on."""
     blocks, surfaces = state.layout.column_of(BLOCK), state.layout.column_of(SURFACE)
     rest = _rest_margin(state, blocks)
@@ -80,6 +89,33 @@ def _relations(state: State) -> _Relations:
     overlap = np.minimum(rest[..., None], reach)
     off_targets = strictly(-np.minimum(rest, reach.max(axis=-1)))
     return _Relations(rest, distance, overlap, np.minimum(rest, off_targets))
+
+
+def _compiled_relations() -> Callable[[State], _Relations]:
+    """The relations of many states by compiled code."""
+    from slap_ros.domains.obstacle2d import kernels
+
+    tolerances = kernels.RelationConstants(
+        BLOCK_SIZE, RESTING_TOLERANCE, OVERLAP_TOLERANCE, STEEPNESS
+    )
+
+    def compiled(state: State) -> _Relations:
+        layout = state.layout
+        blocks, surfaces = layout.column_of(BLOCK), layout.column_of(SURFACE)
+        found = kernels.relations(
+            np.array(state.data),  # that may be changed: numba compiles for either
+            tuple(layout.indices(blocks, name) for name in ("x", "y", "held")),
+            tuple(layout.indices(surfaces, name) for name in ("x", "width", "is_target")),
+            tolerances,
+        )
+        return _Relations(*found)
+
+    return compiled
+
+
+RELATIONS_OF_MANY: TieredFunction[Callable[[State], _Relations]] = TieredFunction(
+    relations_by_numpy, _compiled_relations
+)
 
 
 def _numbers(state: State, column: Column, kind: Type) -> NDArray[np.intp]:

@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 
-from slap_ros.domains.tabletop.state_access import GRASP_NAMES, JOINT_NAMES, bodies
+from slap_ros.domains.tabletop.state_access import GRASP_NAMES, JOINT_NAMES, bodies, single
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.predicates import Bools
@@ -244,12 +243,6 @@ def fallen_below(height: float) -> Callable[[State], Bools]:
         return fallen
 
     return failed
-
-
-@lru_cache(maxsize=256)
-def single(obj: Object) -> Column:
-    """A column of one object."""
-    return Column((obj,))
 
 
 def _joints(state: State) -> Array:

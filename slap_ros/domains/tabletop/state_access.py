@@ -5,10 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
-
-import numpy as np
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, rotate
@@ -41,7 +38,8 @@ def held_body(state: State) -> Object | None:
 
 def joints_of(state: State) -> Joints:
     """Joint positions, rad, shape (7,)."""
-    return np.array(_features(state, robot_of(state), JOINT_NAMES))
+    joints: Joints = state.gather(state.layout.column_of(ROBOT), JOINT_NAMES)[0]
+    return joints
 
 
 def finger_of(state: State) -> float:
@@ -80,5 +78,12 @@ def robot_of(state: State) -> Object:
     return robot
 
 
-def _features(state: State, obj: Object, names: Sequence[str]) -> list[float]:
-    return [float(state.get(obj, name)) for name in names]
+@lru_cache(maxsize=256)
+def single(obj: Object) -> Column:
+    """A column of one object."""
+    return Column((obj,))
+
+
+def _features(state: State, obj: Object, names: tuple[str, ...]) -> list[float]:
+    values: list[float] = state.gather(single(obj), names)[0].tolist()
+    return values

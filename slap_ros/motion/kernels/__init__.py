@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion as machine code, by numba: one file per function of the numpy code, the same to the bit.
 
-Read ``compilation.py`` first, then ``kinematics.py``, ``separation.py`` and ``collision.py``; what
-is built on them follows. ``compiled_backend.py`` is the door.
+Read :mod:`slap_ros.compilation` first, then ``kinematics.py``, ``separation.py`` and
+``collision.py``; what is built on them follows. ``compiled_backend.py`` is the door.
 """

@@ -8,7 +8,7 @@ Two processes do, from both ends, until they meet: half the time on two processo
 import subprocess
 import sys
 
-from slap_ros.motion.kernels.compilation import is_compiled
+from slap_ros.compilation import is_compiled
 from slap_ros.motion.kernels.compiled_backend import CompiledBackend, compiled_backend
 
 FROM_THE_END = "from-the-end"

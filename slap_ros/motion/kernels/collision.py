@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import Array, Joints
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.motion.kernels.kinematics import place_links
 from slap_ros.motion.kernels.separation import separated
 from slap_ros.worlds.panda import JOINTS

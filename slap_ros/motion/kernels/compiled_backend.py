@@ -8,11 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from slap_ros.compilation import compile_once
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.motion.collision_scene import CollisionScene, make_scene, moving_shapes
 from slap_ros.motion.joints import RESOLUTION, Array, Joints, Path
-from slap_ros.motion.kernels.compilation import compile_once
 from slap_ros.motion.kernels.free_space import CompiledFreeSpace
 from slap_ros.motion.kernels.kinematics import arm_frames
 from slap_ros.motion.kernels.linear import rows_to

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import HIGH, LOW, ROUNDING, Array, Joints
 from slap_ros.motion.kernels.collision import is_free
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.motion.kernels.lines import control_steps
 from slap_ros.motion.kernels.separation import dot
 from slap_ros.motion.kernels.trigonometry import arccos, arctan2, sin_cos

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.joints import Array, Joints
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.motion.kernels.trigonometry import sin_cos
 from slap_ros.motion.kinematics import AT_ZERO
 from slap_ros.worlds.panda import JOINTS

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.joints import STEP, Array, Joints, Path
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.motion.kernels.inverse_kinematics import is_within_limits
 from slap_ros.motion.kernels.kinematics import place_links
 from slap_ros.motion.kernels.lines import control_steps

@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import STEP, STRIDE, Joints, Path
 from slap_ros.motion.kernels.collision import is_free
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.worlds.panda import JOINTS
 
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import HIGH, LOW, Array, Joints, Path
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.motion.kernels.lines import (
     control_steps,
     free_row_count,

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
+from slap_ros.compilation import inner
 from slap_ros.geometry.box_separation import NEARLY_PARALLEL, PROJECTIONS, TOUCHING, Array
-from slap_ros.motion.kernels.compilation import inner
 
 
 @inner

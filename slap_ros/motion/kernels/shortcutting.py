@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import Array, Joints, Path
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.motion.kernels.lines import control_steps, is_line_free
 from slap_ros.motion.shortcutting import GAIN
 from slap_ros.worlds.panda import JOINTS

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from slap_ros.motion.kernels.compilation import inner
+from slap_ros.compilation import inner
 from slap_ros.portable_math import (
     ATAN_BORDERS,
     ATAN_COEFFICIENTS,

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from slap_ros.compilation import compiled, inner
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import Joints
 from slap_ros.motion.kernels.collision import is_free
-from slap_ros.motion.kernels.compilation import compiled, inner
 from slap_ros.motion.kernels.lines import is_line_free
 from slap_ros.motion.via_point import COARSE_CHECKS
 from slap_ros.worlds.panda import JOINTS

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -35,6 +35,7 @@ class Arm:
     centres: tuple[Vector, ...]  # of the boxes around them
     radii: tuple[float, ...]  # m, half the boxes' diagonals
     held: Body | None
+    _boxes: dict[int, OrientedBox] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def at(
@@ -74,8 +75,11 @@ class Arm:
         return self.links[len(LINK_SHAPES)]
 
     def box(self, link: int) -> OrientedBox:
-        """The box around a link."""
-        return self.box_at(link, self.links[link])
+        """The box around a link, which is asked for again and again."""
+        box = self._boxes.get(link)
+        if box is None:
+            box = self._boxes[link] = self.box_at(link, self.links[link])
+        return box
 
     def near(self, link: int, point: Vector, distance: float) -> bool:
         """Whether a point is near the box around a link.
@@ -138,14 +142,26 @@ class Sweep:
     def stays_clear(self, boxes: Sequence[OrientedBox]) -> bool:
         """Whether no link comes near any of the boxes, which stand still."""
         around = [(box, box.radius) for box in boxes]
+        highest = max((box.pose.position[2] + radius for box, radius in around), default=-math.inf)
         # The hand, and what it holds, come last and touch first.
         links = range(len(self.travel) - 1, -1, -1)
-        return not any(self._comes_near(link, around) for link in links)
+        return not any(self._comes_near(link, around, highest) for link in links)
 
-    def _comes_near(self, link: int, around: Sequence[tuple[OrientedBox, float]]) -> bool:
-        """Whether a link comes near a box; mostly, the ball around the box already excludes it."""
+    def _comes_near(
+        self, link: int, around: Sequence[tuple[OrientedBox, float]], highest: float
+    ) -> bool:
+        """Whether a link comes near a box; mostly, the ball around the box already excludes it.
+
+        Args:
+            link: Index in ``LINK_SHAPES``; one more is the held body.
+            around: Boxes, each with its radius, m.
+            highest: Height of the highest point of the balls around the boxes, m.
+        """
         # A point is never further than half of its way from where it starts or where it ends.
         margin = CLEARANCE + 0.5 * self.travel[link]
+        low = min(self.start.centres[link][2], self.end.centres[link][2])
+        if low - margin - self.start.radii[link] > highest:
+            return False
         for box, radius in around:
             ball = box.pose.position, margin + radius
             near = self.start.near(link, *ball) or self.end.near(link, *ball)

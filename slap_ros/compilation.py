@@ -13,6 +13,7 @@ before a change, and processors that share a home would overwrite each other's c
 from __future__ import annotations
 
 import fcntl
+import importlib
 import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -24,20 +25,44 @@ from typing import Any, TypeVar, cast
 
 import numba
 from llvmlite import binding
+from numba.np import linalg
 
-from slap_ros import portable_math
 from slap_ros.files import user_cache
-from slap_ros.geometry import box_separation
-from slap_ros.worlds import panda
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-COMPLETE = "complete"  # a file that is written once everything is compiled
+COMPLETE = "complete"  # a file that is written once motion planning is compiled
+# The compiled functions' files, and those with constants that are compiled in.
+SOURCES = (
+    "motion/**/*.py",
+    "policies/kernels.py",
+    "domains/obstacle2d/kernels.py",
+    "portable_math.py",
+    "geometry/box_separation.py",
+    "worlds/panda.py",
+)
 _config: Any = numba.config
 logger = logging.getLogger(__name__)
 
 if _config.DISABLE_JIT:  # these functions as plain Python are slower than numpy
     raise ImportError("numba compiles nothing: NUMBA_DISABLE_JIT is set")
+
+
+def _load_without_blas() -> None:
+    """Let numba load its array functions, for which it would import scipy for a third of a second.
+
+    scipy has the matrix products that numba knows. No compiled function calls them.
+    """
+
+    def nothing() -> None:
+        raise ImportError
+
+    look_for_blas, linalg.ensure_blas = linalg.ensure_blas, nothing
+    importlib.import_module("numba.np.arraymath")
+    linalg.ensure_blas = look_for_blas
+
+
+_load_without_blas()
 
 
 def inner(function: Function) -> Function:
@@ -57,7 +82,7 @@ def compiled(function: Function) -> Function:
 
 
 def is_compiled() -> bool:
-    """Whether everything is in the cache, or can never be."""
+    """Whether all of motion planning is in the cache, or can never be."""
     folder = cache_folder()
     return folder is None or (folder / COMPLETE).exists()
 
@@ -104,10 +129,8 @@ def _digest() -> str:
 
 
 def _sources() -> list[Path]:
-    """The compiled functions' files, and those with constants that are compiled in."""
-    motion = Path(__file__).parent.parent
-    others = [Path(str(module.__file__)) for module in (portable_math, box_separation, panda)]
-    return [*sorted(motion.rglob("*.py")), *others]
+    package = Path(__file__).parent
+    return sorted(file for pattern in SOURCES for file in package.glob(pattern))
 
 
 @contextmanager
