@@ -101,6 +101,16 @@ class AcquisitionPublisher:
             segment_steps=event["segment_steps"],
         )
 
+    def validated(self, event: Event) -> None:
+        """A shortcut was learned over the skills, and tried on validation tasks."""
+        lengths = [event["before"], event["after"]]
+        self._publish(
+            AcquisitionEvent.VALIDATED,
+            subject=event["shortcut"],
+            lengths=[float(length) for length in lengths if length is not None],
+            kept=event["kept"],
+        )
+
     def acquired(self, folder: Path, library: SkillLibrary, operators: str) -> None:
         """A library is there, for everyone to take on.
 

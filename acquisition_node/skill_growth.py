@@ -45,6 +45,7 @@ class SkillGrowth(TrainerGoal):
         self.tell(phase=f"learning {event['shortcut']}", shortcut=event["shortcut"])
 
     def _on_validated(self, event: Event) -> None:
+        self.publisher.validated(event)
         self.tell(shortcut=event["shortcut"])
 
     def _on_round(self, event: Event) -> None:

@@ -42,7 +42,7 @@ ADDED = {
     "slap_msgs/msg/PlanEdge": ("others_may_appear", "forbidden_atoms"),
     "slap_msgs/msg/AcquisitionEvent": (
         *("ROLLED_OUT", "JUDGED", "ACQUIRED", "operators", "iteration", "task", "progress"),
-        *("success", "segment_steps", "digest"),
+        *("success", "segment_steps", "digest", "VALIDATED", "lengths", "kept"),
     ),
 }
 UNDEFINED = (TypesysError, SyntaxError, ValueError, KeyError, IndexError, RecursionError)

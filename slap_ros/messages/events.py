@@ -29,7 +29,7 @@ class SkillEventKind(IntEnum):
 
 
 class AcquisitionEventKind(IntEnum):
-    """What happens to a proposal and to its skills: ``slap_msgs/AcquisitionEvent.kind``."""
+    """What happens to a proposal, its skills and shortcuts: ``slap_msgs/AcquisitionEvent.kind``."""
 
     STARTED = 0
     ANSWERED = 1
@@ -40,3 +40,4 @@ class AcquisitionEventKind(IntEnum):
     ROLLED_OUT = 6
     JUDGED = 7
     ACQUIRED = 8
+    VALIDATED = 9

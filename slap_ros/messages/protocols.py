@@ -202,6 +202,13 @@ class LearningEventMessage(AcquisitionEventMessage, Protocol):
     digest: str
 
 
+class ShortcutEventMessage(AcquisitionEventMessage, Protocol):
+    """Fields that events of shortcuts have besides; earlier bags have no such events."""
+
+    lengths: Sequence[float]
+    kept: bool
+
+
 class PointMessage(Protocol):
     """``geometry_msgs/Point`` or ``geometry_msgs/Vector3``."""
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How skills were acquired: iterations, what failed in each, and the success of each skill."""
+"""How skills were acquired: iterations, the success of each skill, and shortcuts over them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from statistics import fmean
 from typing import cast
 
 from slap_ros.messages.events import AcquisitionEventKind
-from slap_ros.messages.protocols import AcquisitionEventMessage, LearningEventMessage
+from slap_ros.messages.protocols import (
+    AcquisitionEventMessage,
+    LearningEventMessage,
+    ShortcutEventMessage,
+)
 
 SKILLS = "skills"  # subject of what ends an acquisition
 LEARNING = frozenset({AcquisitionEventKind.ROLLED_OUT, AcquisitionEventKind.JUDGED})
@@ -68,6 +72,23 @@ class SkillCurve:
 
 
 @dataclass(frozen=True)
+class RecordedShortcut:
+    """A shortcut that was learned over the skills, and tried on validation tasks.
+
+    Args:
+        name: Name of the shortcut.
+        without: Environment steps of the mean plan without the shortcut; None if not known.
+        length: Environment steps of the mean plan with it; None where a task had no plan then.
+        kept: Whether the shortcut became part of its library.
+    """
+
+    name: str
+    without: float | None
+    length: float | None
+    kept: bool
+
+
+@dataclass(frozen=True)
 class RecordedAcquisition:
     """Skills that were acquired, as far as the bag tells.
 
@@ -78,6 +99,7 @@ class RecordedAcquisition:
         operators: Operators with their rewards, as people read them.
         iterations: Iterations in order.
         curves: Learning curves, one per skill that was trained.
+        shortcuts: Shortcuts that were learned over the skills, in order.
     """
 
     outcome: str
@@ -86,6 +108,7 @@ class RecordedAcquisition:
     operators: tuple[str, ...]
     iterations: tuple[RecordedIteration, ...]
     curves: tuple[SkillCurve, ...]
+    shortcuts: tuple[RecordedShortcut, ...] = ()
 
 
 @dataclass
@@ -94,6 +117,12 @@ class _OngoingAcquisition:
 
     operators: Sequence[str] = ()
     events: list[LearningEventMessage] = field(default_factory=list)
+    shortcuts: list[RecordedShortcut] = field(default_factory=list)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is anything to show of it."""
+        return bool(self.events or self.shortcuts)
 
     def ended(self, outcome: str, reason: str = "", digest: str = "") -> RecordedAcquisition:
         rolled_out = [e for e in self.events if e.kind == AcquisitionEventKind.ROLLED_OUT]
@@ -108,6 +137,7 @@ class _OngoingAcquisition:
             tuple(map(str, self.operators)),
             tuple(_iteration(n, [e for e in rolled_out if e.iteration == n]) for n in iterations),
             tuple(curve for curve in curves if curve.steps),
+            tuple(self.shortcuts),
         )
 
 
@@ -119,21 +149,29 @@ def recorded_acquisitions(
     now = _OngoingAcquisition()
     for event in events:
         if event.kind == AcquisitionEventKind.STARTED:
-            if now.events:
+            if now.is_known:
                 found.append(now.ended("not ended"))
             now = _OngoingAcquisition()
         elif event.kind == AcquisitionEventKind.FINISHED:
             now.operators = getattr(event, "operators", ())  # earlier bags have none
         elif event.kind in LEARNING:
             now.events.append(cast(LearningEventMessage, event))
-        elif event.kind in ENDS and now.events:
+        elif event.kind == AcquisitionEventKind.VALIDATED:
+            now.shortcuts.append(_shortcut(cast(ShortcutEventMessage, event)))
+        elif event.kind in ENDS and now.is_known:
             digest = getattr(event, "digest", "")
             kind = AcquisitionEventKind(event.kind)
             found.append(now.ended(ENDS[kind], event.error_msg, digest))
             now = _OngoingAcquisition()
-    if now.events:
+    if now.is_known:
         found.append(now.ended("not ended"))
     return tuple(found)
+
+
+def _shortcut(event: ShortcutEventMessage) -> RecordedShortcut:
+    known = [float(length) if isfinite(length) else None for length in event.lengths]
+    without, length, *_ = [*known, None, None]
+    return RecordedShortcut(event.subject, without, length, bool(event.kept))
 
 
 def _iteration(number: int, rollouts: Sequence[LearningEventMessage]) -> RecordedIteration:

@@ -16,7 +16,7 @@ ENDS = {
     AcquisitionEventKind.FAILED: "failed",
     AcquisitionEventKind.CANCELED: "canceled",
 }
-OF_SKILLS = LEARNING | {AcquisitionEventKind.ACQUIRED}
+OF_SKILLS = LEARNING | {AcquisitionEventKind.ACQUIRED, AcquisitionEventKind.VALIDATED}
 KINDS = {int(kind): kind for kind in AcquisitionEventKind}
 IN_PLAN = "all operators together"
 

@@ -124,7 +124,10 @@ def test_one_bag_has_the_proposal_the_skills_and_the_plan_that_a_shortcut_makes_
     assert second.shortcut_steps == second.plan_length
     page = render([read_report(bag)])
     assert "proposal 1: accepted" in page and "acquisition 1: skills acquired" in page
-    assert grown.shortcuts[0] in page and grown.digest in page
+    assert grown.digest in page
+    (growth,) = read_report(bag).acquisitions
+    assert [one.name for one in growth.shortcuts if one.kept] == list(grown.shortcuts)
+    assert f'<th scope="row"><code>{grown.shortcuts[0]}</code></th>' in page
 
 
 @contextmanager

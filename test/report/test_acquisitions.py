@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a bag tells of skills: whole, broken off, with numbers that cannot be, and earlier ones."""
+"""What a bag tells of skills and shortcuts: whole, broken off, with impossible numbers, earlier."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 from slap_ros.messages.events import AcquisitionEventKind as Kind
@@ -70,6 +70,28 @@ def test_what_breaks_off_or_fails_is_shown_up_to_there():
     rejected = [event(Kind.STARTED), failed]  # no operators, so nothing was learned
     assert recorded_acquisitions(rejected) == ()
     assert [one.reason for one in recorded_proposals(rejected)] == ["killed"]
+
+
+def validated(shortcut, *lengths, kept=False):
+    return event(Kind.VALIDATED, subject=shortcut, lengths=lengths, kept=kept)
+
+
+def test_shortcuts_over_the_skills_are_shown_whether_kept_or_not():
+    tried = [
+        validated("Push", 120.0, 90.0, kept=True),
+        validated("Throw", 90.0),  # with it, a task had no plan
+        validated("Slide", math.inf, math.nan),
+    ]
+    events = [*BEGUN, *tried, event(Kind.ACQUIRED)]
+    (grown,) = recorded_acquisitions(events)
+    assert [astuple(one) for one in grown.shortcuts] == [
+        ("Push", 120.0, 90.0, True),
+        ("Throw", 90.0, None, False),
+        ("Slide", None, None, False),
+    ]
+    assert [one.outcome for one in recorded_proposals(events)] == ["accepted"]
+    (gone_on,) = recorded_acquisitions(tried)  # the skills were learned before
+    assert (gone_on.outcome, len(gone_on.shortcuts), gone_on.curves) == ("not ended", 3, ())
 
 
 def test_numbers_that_cannot_be_are_drawn_as_some_that_can():
