@@ -22,6 +22,7 @@ from slap_ros.acquisition.training import skill_training
 from slap_ros.acquisition.training.retrieval import nearest
 from slap_ros.acquisition.training.sac_settings import SacSettings
 from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.acquisition.training.skill_training import ENOUGH_IN_A_ROW
 from slap_ros.core.goals import task_with_goal
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError, UnsolvableError
 from slap_ros.learning.workers import SequentialWorkers, local_workers
@@ -395,12 +396,29 @@ def test_where_all_skills_are_there_nothing_is_learned(tmp_path):
     assert library.digest == load_skill_library(tmp_path / "both", POINTS).digest
 
 
+def test_where_enough_tasks_are_solved_they_are_judged_again_and_nothing_is_learned(tmp_path):
+    """A round from the few states that still fail would cost steps, and spoil a good skill."""
+    there = kept(tmp_path / "weak", weak_picking(), PUTTING)
+    settings = replace(SHORT, rollouts=20, solved=0.1)
+    library, events = acquire(tmp_path / "work", settings, kept=there)
+    assert library.record["ended"] == "enough tasks are solved"
+    assert len(events.progress) == ENOUGH_IN_A_ROW
+    assert all(failures for _, failures in events.progress)
+    assert not events.judged
+
+
+def weak_picking():
+    """A skill that never goes to the left."""
+    weak = replace(PICKING, policy=towards(0, False))
+    weak.policy.layers[1][0][0, 1] = 0.0
+    return weak
+
+
 @pytest.mark.slow
 @pytest.mark.training
 def test_a_skill_that_fails_again_is_learned_further(tmp_path):
     """From its own weights; what it was worth stays a candidate."""
-    weak = replace(PICKING, policy=towards(0, False))
-    weak.policy.layers[1][0][0, 1] = 0.0  # it never goes to the left
+    weak = weak_picking()
     there = kept(tmp_path / "weak", weak, PUTTING)
     settings = replace(SHORT, rollouts=8, sac=replace(SAC, net_arch=(4,)))
     library, events = acquire(tmp_path / "work", settings, kept=there)

@@ -143,6 +143,8 @@ class Curriculum:
         self.callback.on_rollouts(iteration, rollouts)
         if over := self._why_over(rollouts, state):
             return over
+        if state.solved.done(self.settings.solved, in_a_row=1):
+            return ""  # judged again in other tasks: what may be enough is not trained further
         unseen = VALIDATION.batch(iteration, self.settings.validation)
         fresh = self._roll_out(iteration, "fresh", unseen, at_hand)
         selection = select_skills(rollouts, state, self.settings)

@@ -71,14 +71,15 @@ class SolvedShares:
             self.points.append(Point(steps + number * segment_steps, self._product(self._stages)))
         self._success[skill] = outcome.success
 
-    def done(self, share: float) -> bool:
-        """Whether as many judgements in a row as make a goal done have a share.
+    def done(self, share: float, in_a_row: int = ENOUGH_IN_A_ROW) -> bool:
+        """Whether the latest judgements have a share.
 
         Args:
             share: Share of tasks that are solved.
+            in_a_row: Number of judgements; by default as many as make a goal done.
         """
-        latest = self.points[-ENOUGH_IN_A_ROW:]
-        return len(latest) == ENOUGH_IN_A_ROW and all(one.success >= share for one in latest)
+        latest = self.points[-in_a_row:]
+        return len(latest) == in_a_row and all(one.success >= share for one in latest)
 
     def needed(self, share: float, skills: Collection[str]) -> float:
         """The success that each of some skills needs, so that a share of tasks is solved.
