@@ -36,7 +36,7 @@ $(VENV)/.installed: $(METADATA)
 	@echo "== setting up $(VENV), which takes about a minute"
 	$(PYTHON) -m venv $(VENV) || \
 	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
-	$(PIP_INSTALL) uv
+	$(PIP_INSTALL) uv || true  # then pip does it all
 	$(call install_packages,-e ./embedded_ros -e '.[physics]')
 	$(COMPILE_LIBRARIES) & $(COMPILE_MOTION) && wait $$!
 	@touch $@
