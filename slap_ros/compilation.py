@@ -37,6 +37,7 @@ SOURCES = (
     "motion/**/*.py",
     "policies/kernels.py",
     "domains/obstacle2d/kernels.py",
+    "shortcuts/kernels.py",
     "portable_math.py",
     "geometry/box_separation.py",
     "worlds/panda.py",

@@ -27,6 +27,7 @@ class Bodies(NamedTuple):
     x: Array  # m, shape (blocks,)
     y: Array  # m, shape (blocks,)
     held: Flags  # shape (blocks,)
+    waits: Numbers  # to be pushed: 1 to the right, -1 to the left, shape (blocks,)
 
 
 class Sizes(NamedTuple):
@@ -58,7 +59,13 @@ def step(
     """
     place, x, y, held = columns
     blocks = len(x)
-    bodies = Bodies(np.empty(2), np.empty(blocks), np.empty(blocks), np.empty(blocks, np.bool_))
+    bodies = Bodies(
+        np.empty(2),
+        np.empty(blocks),
+        np.empty(blocks),
+        np.empty(blocks, np.bool_),
+        np.empty(blocks, np.intp),
+    )
     after = data.copy()
     for i in range(len(data)):
         row = after[i]
@@ -155,19 +162,28 @@ def _room_aside(
 @inner
 def _push(bodies: Bodies, start: float, pusher: float, sizes: Sizes) -> None:
     """Shift blocks to either side until none overlaps the pusher or its neighbour."""
-    is_right = bodies.x > start
-    for side in (1.0, -1.0):
+    for b in range(len(bodies.x)):
+        bodies.waits[b] = 0 if bodies.held[b] else (1 if bodies.x[b] > start else -1)
+    for side in (1, -1):
         edge = side * pusher + sizes.block
-        waiting = (is_right == (side > 0.0)) & ~bodies.held
-        while waiting.any():
-            block, least = -1, np.inf
-            for b in range(len(waiting)):
-                if waiting[b] and (block < 0 or side * bodies.x[b] < least):
-                    block, least = b, side * bodies.x[b]
-            waiting[block] = False
-            moved = edge if edge > least + sizes.rounding else least
+        block = _next_to_push(bodies, side)
+        while block >= 0:
+            here = side * bodies.x[block]
+            moved = edge if edge > here + sizes.rounding else here
             bodies.x[block] = side * moved
+            bodies.waits[block] = 0
             edge = moved + sizes.block
+            block = _next_to_push(bodies, side)
+
+
+@inner
+def _next_to_push(bodies: Bodies, side: int) -> int:
+    """Number of the block nearest to the pusher that still waits on a side; -1 without."""
+    block = -1
+    for b in range(len(bodies.x)):
+        if bodies.waits[b] == side and (block < 0 or side * bodies.x[b] < side * bodies.x[block]):
+            block = b
+    return block
 
 
 class RelationConstants(NamedTuple):
