@@ -231,3 +231,38 @@ def relations(
                 most = max(most, reach)
             on_table[i, b] = min(rest[i, b], -min(rest[i, b], most) - TINY)
     return rest, distance, overlap, on_table
+
+
+@compiled
+def on_margins(
+    data: Array,
+    relations: tuple[Array, Array, Array],
+    numbers: tuple[Numbers, Numbers],
+    of_surfaces: tuple[Numbers, Numbers],
+    sizes: tuple[float, float],
+) -> Array:
+    """See :func:`slap_ros.domains.obstacle2d.model.on_margin_by_numpy`.
+
+    Args:
+        data: States, shape (n, features).
+        relations: Rest, distance and on_table of these states.
+        numbers: Numbers of the blocks and of the surfaces that are asked about.
+        of_surfaces: Columns of width and is_target of the surfaces that are asked about.
+        sizes: A block's, and how far one may reach over an edge, m.
+    """
+    rest, distance, on_table = relations
+    blocks, surfaces = numbers
+    width, is_target = of_surfaces
+    block_size, tolerance = sizes
+    margins = np.empty((len(data), len(blocks)))
+    for i in range(len(data)):
+        for k in range(len(blocks)):
+            b = blocks[k]
+            if data[i, is_target[k]] > 0.5:
+                room = (data[i, width[k]] - block_size) / 2 + tolerance
+                inside = room - distance[i, b, surfaces[k]]
+                missing = min(rest[i, b], 0.0) + min(inside, 0.0)
+                margins[i, k] = missing if missing < 0.0 else min(rest[i, b], inside)
+            else:
+                margins[i, k] = on_table[i, b]
+    return margins
