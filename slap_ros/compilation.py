@@ -34,9 +34,11 @@ Function = TypeVar("Function", bound=Callable[..., object])
 COMPLETE = "complete"  # a file that is written once motion planning is compiled
 # The compiled functions' files, and those with constants that are compiled in.
 SOURCES = (
+    "compilation.py",
     "motion/**/*.py",
     "policies/kernels.py",
     "domains/obstacle2d/kernels.py",
+    "shortcuts/kernels.py",
     "portable_math.py",
     "geometry/box_separation.py",
     "worlds/panda.py",
@@ -57,9 +59,12 @@ def _load_without_blas() -> None:
     def nothing() -> None:
         raise ImportError
 
-    look_for_blas, linalg.ensure_blas = linalg.ensure_blas, nothing
-    importlib.import_module("numba.np.arraymath")
-    linalg.ensure_blas = look_for_blas
+    look_for_blas = getattr(linalg, "ensure_blas", nothing)
+    linalg.ensure_blas = nothing
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = look_for_blas
 
 
 _load_without_blas()

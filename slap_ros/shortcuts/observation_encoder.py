@@ -10,7 +10,7 @@ a kind than training had, the slots hold those that are not done yet, in their o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -26,6 +26,7 @@ from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State, Ta
 from slap_ros.relational.predicates import Bools, Predicate
 from slap_ros.relational.state import Array
 from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kinds
+from slap_ros.tiered_function import TieredFunction
 
 # Terms of the potential, all against the hand being ``length_m`` away from its next object.
 ATOM_WEIGHT = 3.0  # an atom that is not achieved at all
@@ -91,12 +92,6 @@ def observation_layout(
         for name in signature.slots
     }
     return ObservationLayout(interface.robot(batch, hand).shape[-1], signature.slots, widths)
-
-
-def observation_size(domain: Domain, signature: Signature) -> int | None:
-    """Features of an observation; None where no task at hand has objects of all its kinds."""
-    layout = observation_layout(domain, signature, domain.task(0).initial_state)
-    return None if layout is None else layout.size
 
 
 @dataclass(frozen=True)
@@ -354,9 +349,7 @@ class ObservationEncoder:
         Returns:
             Shape (n, objects).
         """
-        # Atoms first: the largest along the first axis is found several times as fast.
-        shares = deficits.T[:, :, None] * self._shares[:, None, :]
-        own: Array = np.maximum.reduce(shares, axis=0)
+        own = LARGEST_SHARES.of(len(deficits))(deficits, self._shares)
         orphans = self._find_orphans(state, hand)
         if not orphans.places:
             return own
@@ -425,6 +418,32 @@ class ObservationEncoder:
             filled = _into_slots(features, object_deficits[:, numbers], slots)
             parts.append(filled.reshape(len(features), -1))
         return on_grid(np.concatenate(parts, axis=-1)).astype(np.float32)
+
+
+def largest_shares(deficits: Array, shares: Array) -> Array:
+    """The largest deficit of each object.
+
+    Args:
+        deficits: Deficits of atoms, shape (n, atoms).
+        shares: 1 where an atom is about an object, else 0, shape (atoms, objects).
+
+    Returns:
+        Shape (n, objects).
+    """
+    # Atoms first: the largest along the first axis is found several times as fast.
+    largest: Array = np.maximum.reduce(deficits.T[:, :, None] * shares[:, None, :], axis=0)
+    return largest
+
+
+def _compiled_shares() -> Callable[[Array, Array], Array]:
+    from slap_ros.shortcuts import kernels
+
+    return lambda deficits, shares: kernels.largest_shares(np.ascontiguousarray(deficits), shares)
+
+
+LARGEST_SHARES: TieredFunction[Callable[[Array, Array], Array]] = TieredFunction(
+    largest_shares, _compiled_shares
+)
 
 
 def _robot_columns(domain: Domain, space: AtomSpace) -> NDArray[np.intp]:

@@ -43,7 +43,8 @@ from slap_ros.policies.library_files import (
     write_object,
 )
 from slap_ros.policies.mlp_policy import MlpPolicy
-from slap_ros.shortcuts.observation_encoder import make_action_map, observation_size
+from slap_ros.relational import State
+from slap_ros.shortcuts.observation_encoder import make_action_map, observation_layout
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Signature
 
@@ -150,22 +151,24 @@ def load_library(path: Path, domain: Domain) -> ShortcutLibrary:
             f"{path}: a library of domain {about['domain']!r}, not of {domain.name!r}"
         )
 
+    state = domain.task(0).initial_state
+
     def load(folder: Path) -> Shortcut:
         shortcut = load_shortcut(folder)
-        _require_fit(shortcut, folder, domain)
+        _require_fit(shortcut, folder, domain, state)
         return shortcut
 
     shortcuts, refused = read_members(path, load)
     return ShortcutLibrary(domain.name, shortcuts, record_of(about), refused)
 
 
-def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
-    """Refuse a policy whose observations or actions are not those of the domain."""
-    features = observation_size(domain, shortcut.signature)
+def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain, state: State) -> None:
+    """Refuse a policy whose observations or actions are not those of the domain in a state."""
+    layout = observation_layout(domain, shortcut.signature, state)
     size = _learned(shortcut).normalisation.mean.size
-    if features is not None and features != size:
+    if layout is not None and layout.size != size:
         raise InvalidLibraryError(
-            f"{folder}: the policy has {size} observed features, {domain.name} has {features}: "
+            f"{folder}: the policy has {size} observed features, {domain.name} has {layout.size}: "
             "learned with another version of slap_ros; train again"
         )
     actions = make_action_map(domain, shortcut.signature).size

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Obstacle 2D: the world's physics, its tasks, and operators that tell the truth."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -12,8 +12,11 @@ from slap_ros.domains.obstacle2d.dynamics import GRASP_TOLERANCE, STEP_OF_MANY, 
 from slap_ros.domains.obstacle2d.model import (
     BLOCK,
     BLOCK_SIZE,
+    ON_MARGIN_OF_MANY,
     RELATIONS_OF_MANY,
     ROBOT,
+    SURFACE,
+    on_margin_by_numpy,
     relations_by_numpy,
 )
 from slap_ros.domains.obstacle2d.tasks import make_task
@@ -23,7 +26,7 @@ from slap_ros.errors import (
     InvalidStateError,
     UnknownDomainError,
 )
-from slap_ros.relational import State
+from slap_ros.relational import Column, State
 
 FAIR = get_domain("obstacle2d")
 TOUCH = 1e-5  # m, overlap that counts as touching
@@ -129,6 +132,11 @@ def test_relations_of_many_states_have_the_bits_of_each():
         for i, state in enumerate(states):
             for of_all, of_one in zip(together, relations_by_numpy(state), strict=True):
                 assert of_all[i].tobytes() == of_one.tobytes()
+        pairs = states[0].layout.of_type(BLOCK), states[0].layout.of_type(SURFACE)
+        columns = [Column(objects) for objects in zip(*product(*pairs), strict=True)]
+        margins = ON_MARGIN_OF_MANY.compiled()(0.01, State.batch(states), *columns)
+        for i, state in enumerate(states):
+            assert margins[i].tobytes() == on_margin_by_numpy(0.01, state, *columns).tobytes()
 
 
 def test_a_push_moves_a_chain_up_to_the_wall():

@@ -16,8 +16,10 @@ from slap_ros.domains.tabletop.state_access import JOINT_NAMES
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import (
     JOINT_LIMIT_WEIGHT,
+    LARGEST_SHARES,
     PROXIMITY_WEIGHT,
     ObservationEncoder,
+    largest_shares,
 )
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.worlds.joint_space.features import ROBOT
@@ -128,3 +130,12 @@ def test_joints_are_seen_to_take_the_hand_as_far_as_they_do():
         assert seen[i] == pytest.approx(
             shift @ way / np.linalg.norm(way) / part / STEP_SCALE, abs=1e-4
         )
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_compiled_shares_have_the_bits_of_numpy(order):
+    rng = np.random.default_rng(0)
+    deficits = np.asarray(np.maximum(rng.normal(size=(50, 6)), 0.0), order=order)
+    shares = (rng.random((6, 4)) < 0.4).astype(np.float64)
+    found = LARGEST_SHARES.compiled()(deficits, shares)
+    assert found.tobytes() == largest_shares(deficits, shares).tobytes()

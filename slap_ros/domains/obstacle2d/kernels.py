@@ -27,6 +27,7 @@ class Bodies(NamedTuple):
     x: Array  # m, shape (blocks,)
     y: Array  # m, shape (blocks,)
     held: Flags  # shape (blocks,)
+    waits: Numbers  # to be pushed: 1 to the right, -1 to the left, shape (blocks,)
 
 
 class Sizes(NamedTuple):
@@ -58,7 +59,13 @@ def step(
     """
     place, x, y, held = columns
     blocks = len(x)
-    bodies = Bodies(np.empty(2), np.empty(blocks), np.empty(blocks), np.empty(blocks, np.bool_))
+    bodies = Bodies(
+        np.empty(2),
+        np.empty(blocks),
+        np.empty(blocks),
+        np.empty(blocks, np.bool_),
+        np.empty(blocks, np.intp),
+    )
     after = data.copy()
     for i in range(len(data)):
         row = after[i]
@@ -155,19 +162,28 @@ def _room_aside(
 @inner
 def _push(bodies: Bodies, start: float, pusher: float, sizes: Sizes) -> None:
     """Shift blocks to either side until none overlaps the pusher or its neighbour."""
-    is_right = bodies.x > start
-    for side in (1.0, -1.0):
+    for b in range(len(bodies.x)):
+        bodies.waits[b] = 0 if bodies.held[b] else (1 if bodies.x[b] > start else -1)
+    for side in (1, -1):
         edge = side * pusher + sizes.block
-        waiting = (is_right == (side > 0.0)) & ~bodies.held
-        while waiting.any():
-            block, least = -1, np.inf
-            for b in range(len(waiting)):
-                if waiting[b] and (block < 0 or side * bodies.x[b] < least):
-                    block, least = b, side * bodies.x[b]
-            waiting[block] = False
-            moved = edge if edge > least + sizes.rounding else least
+        block = _next_to_push(bodies, side)
+        while block >= 0:
+            here = side * bodies.x[block]
+            moved = edge if edge > here + sizes.rounding else here
             bodies.x[block] = side * moved
+            bodies.waits[block] = 0
             edge = moved + sizes.block
+            block = _next_to_push(bodies, side)
+
+
+@inner
+def _next_to_push(bodies: Bodies, side: int) -> int:
+    """Number of the block nearest to the pusher that still waits on a side; -1 without."""
+    block = -1
+    for b in range(len(bodies.x)):
+        if bodies.waits[b] == side and (block < 0 or side * bodies.x[b] < side * bodies.x[block]):
+            block = b
+    return block
 
 
 class RelationConstants(NamedTuple):
@@ -215,3 +231,38 @@ def relations(
                 most = max(most, reach)
             on_table[i, b] = min(rest[i, b], -min(rest[i, b], most) - TINY)
     return rest, distance, overlap, on_table
+
+
+@compiled
+def on_margins(
+    data: Array,
+    relations: tuple[Array, Array, Array],
+    numbers: tuple[Numbers, Numbers],
+    of_surfaces: tuple[Numbers, Numbers],
+    sizes: tuple[float, float],
+) -> Array:
+    """See :func:`slap_ros.domains.obstacle2d.model.on_margin_by_numpy`.
+
+    Args:
+        data: States, shape (n, features).
+        relations: Rest, distance and on_table of these states.
+        numbers: Numbers of the blocks and of the surfaces that are asked about.
+        of_surfaces: Columns of width and is_target of the surfaces that are asked about.
+        sizes: A block's, and how far one may reach over an edge, m.
+    """
+    rest, distance, on_table = relations
+    blocks, surfaces = numbers
+    width, is_target = of_surfaces
+    block_size, tolerance = sizes
+    margins = np.empty((len(data), len(blocks)))
+    for i in range(len(data)):
+        for k in range(len(blocks)):
+            b = blocks[k]
+            if data[i, is_target[k]] > 0.5:
+                room = (data[i, width[k]] - block_size) / 2 + tolerance
+                inside = room - distance[i, b, surfaces[k]]
+                missing = min(rest[i, b], 0.0) + min(inside, 0.0)
+                margins[i, k] = missing if missing < 0.0 else min(rest[i, b], inside)
+            else:
+                margins[i, k] = on_table[i, b]
+    return margins

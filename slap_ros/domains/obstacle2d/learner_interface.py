@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +35,7 @@ def _hand(state: State) -> Array:
 def _robot(_: State, hand: Array) -> Array:
     """Where it is in the unit square, how far down what it carries reaches, how low it is."""
     x, y, low = np.moveaxis(hand, -1, 0)
-    return np.stack([2 * x - 1, 2 * y - 1, (y - low) / BLOCK_SIZE, low / BLOCK_SIZE], axis=-1)
+    return _side_by_side([2 * x - 1, 2 * y - 1, (y - low) / BLOCK_SIZE, low / BLOCK_SIZE])
 
 
 def _object_features(state: State, hand: Array, column: Column) -> Array:
@@ -46,7 +46,15 @@ def _object_features(state: State, hand: Array, column: Column) -> Array:
     if column.objects[0].type.is_a(BLOCK):
         features += [(state.stack(column, "y") - y) / (2 * BLOCK_SIZE)]
         features += [state.stack(column, "held")]
-    return np.stack(features, axis=-1)
+    return _side_by_side(features)
+
+
+def _side_by_side(features: Sequence[Array]) -> Array:
+    """The features along a last axis, as ``np.stack`` has them in twice the time."""
+    together = np.empty((*features[0].shape, len(features)))
+    for i, feature in enumerate(features):
+        together[..., i] = feature
+    return together
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:

@@ -140,13 +140,52 @@ def _both(one: Array, other: Array) -> Array:
 
 
 def _on_margin(tolerance: float, state: State, block: Column, surface: Column) -> Array:
-    """On a target area: inside it. On the table: at rest and off every target area."""
+    if state.data.ndim != 2:
+        return on_margin_by_numpy(tolerance, state, block, surface)
+    return ON_MARGIN_OF_MANY.of(len(state.data))(tolerance, state, block, surface)
+
+
+def on_margin_by_numpy(tolerance: float, state: State, block: Column, surface: Column) -> Array:
+    """On a target area: inside it. On the table: at rest and off every target area.
+
+    Args:
+        tolerance: How far a block may reach over the edge of a target area, m.
+        state: One state, or a batch.
+        block: Blocks.
+        surface: Surface for each of them.
+
+    Returns:
+        Margins, m, shape (..., blocks).
+    """
     known = _relations(state)
     of_blocks, of_surfaces = _numbers(state, block, BLOCK), _numbers(state, surface, SURFACE)
     room = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + tolerance
     distance = known.distance[..., of_blocks, of_surfaces]
     inside = _both(known.rest[..., of_blocks], room - distance)
     return np.where(_is_target(state, surface), inside, known.on_table[..., of_blocks])
+
+
+def _compiled_on_margin() -> OnMargin:
+    """The margins of many states by compiled code."""
+    from slap_ros.domains.obstacle2d import kernels
+
+    def compiled(tolerance: float, state: State, block: Column, surface: Column) -> Array:
+        known, layout = _relations(state), state.layout
+        return kernels.on_margins(
+            np.array(state.data),
+            (known.rest, known.distance, known.on_table),
+            (_numbers(state, block, BLOCK), _numbers(state, surface, SURFACE)),
+            (layout.indices(surface, "width"), layout.indices(surface, "is_target")),
+            (BLOCK_SIZE, tolerance),
+        )
+
+    return compiled
+
+
+OnMargin = Callable[[float, State, Column, Column], Array]
+ON_MARGIN_OF_MANY: TieredFunction[OnMargin] = TieredFunction(
+    on_margin_by_numpy, _compiled_on_margin
+)
 
 
 def _clear_margin(state: State, surface: Column) -> Array:
