@@ -35,6 +35,7 @@ from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.acquisition.training.skill_training import ENOUGH_IN_A_ROW
 from slap_ros.api.acquisition import AcquisitionWatch, carry_out
 from slap_ros.api.acquisition_request import AcquisitionRequest
+from slap_ros.api.command_line import command_line
 from slap_ros.api.jobs import some_workers
 from slap_ros.api.learning_curves import PLAN, CurveCallback, steps_to
 from slap_ros.core.goals import task_with_goal
@@ -83,6 +84,24 @@ class SequenceRequest:
             )
         if len(set(self.goals)) < len(self.goals):
             raise InvalidParameterError("a goal stands twice in the sequence; leave one out")
+
+    @property
+    def command(self) -> str:
+        """The command that acquires the same library again."""
+        base = self.acquisition
+        own = list(self.goals) == list(base.domain.goals)
+        return command_line(
+            "acquire-sequence",
+            base.domain.name,
+            preset=base.domain.preset,
+            goal=None if own else list(self.goals),
+            seed=base.seed,
+            scratch=self.scratch or None,
+            tasks=self.tasks,
+            settings=base.settings,
+            steps=base.steps,
+            set=list(base.changes) or None,
+        )
 
     def acquisition_of(self, number: int) -> AcquisitionRequest:
         """The request for the acquisition of a goal.
@@ -225,6 +244,7 @@ def acquire_sequence(
         known = _tried(request, number, known, jobs, watch)
         steps.append(_step(goal, before, library.record, measured, known))
         sequence = {
+            "command": request.command,
             "scratch": request.scratch,
             "goals": [step.as_json() for step in steps],
             "to_come": list(request.goals[number + 1 :]),

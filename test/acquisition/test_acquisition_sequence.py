@@ -54,6 +54,8 @@ def test_a_second_goal_is_learned_with_the_skills_of_the_first(tmp_path, monkeyp
     assert first["retrieved"] == {}
     assert set(second["retrieved"]) == set(second["learned"])
     record = json.loads((tmp_path / "library" / "library.json").read_text())
+    made_by = record["sequence"].pop("command")
+    assert made_by.startswith("slap acquire-sequence points --preset")
     assert record["sequence"] == {"scratch": False, "goals": steps, "to_come": []}
     monkeypatch.setattr(jobs, "learn", None)  # nothing is learned when it is asked for again
     assert json.loads(sequence(*asked).stdout) == json.loads(ran.stdout)
@@ -136,6 +138,8 @@ def test_each_goal_leaves_a_library_of_the_sequence_so_far(tmp_path):
     sequence = load_skill_library(folder, POINTS).record["sequence"]
     assert [step["goal"] for step in sequence["goals"]] == ["train"]
     assert sequence["to_come"] == ["swapped"]
+    assert sequence["command"].startswith("slap acquire-sequence points --preset")
+    assert "--steps 200 --set rollouts=2 --set validation=2" in sequence["command"]
 
 
 @pytest.mark.parametrize(
