@@ -526,6 +526,16 @@ def test_a_plan_that_fails_in_the_model_is_no_plan_to_shorten(hasty):
     assert not planned.success and "Put" in planned.reason
 
 
+@pytest.mark.parametrize("name", ["join", "grown"])
+def test_libraries_that_ship_together_are_those_that_were_evaluated(name):
+    folder = Path(__file__).parents[2] / "models" / name
+    bench = open_domain(DomainChoice("stack_at_target", "fair:blocked=1", str(folder / "skills")))
+    evaluated = json.loads((folder / "evaluation.json").read_text())
+    assert evaluated["skills"]["digest"] == bench.configuration["skills_digest"]
+    library = chosen_library(str(folder / "shortcuts"), bench)  # refused over other skills
+    assert evaluated["library"]["digest"] == library.digest
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # plans in contact, with the paper's search as well
 def test_the_join_that_ships_belongs_together_and_saves_steps():
