@@ -37,6 +37,7 @@ SOURCES = (
     "compilation.py",
     "motion/**/*.py",
     "policies/kernels.py",
+    "domains/classifiers.py",
     "domains/obstacle2d/kernels.py",
     "shortcuts/kernels.py",
     "portable_math.py",
