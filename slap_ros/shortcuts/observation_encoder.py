@@ -349,11 +349,12 @@ class ObservationEncoder:
         Returns:
             Shape (n, objects).
         """
-        own = LARGEST_SHARES.of(len(deficits))(deficits, self._shares)
+        largest = LARGEST_SHARES.of(len(deficits))
+        own = largest(deficits, self._shares)
         orphans = self._find_orphans(state, hand)
         if not orphans.places:
             return own
-        due = (deficits[:, orphans.atoms, None] * self._shares[orphans.atoms]).max(axis=1)
+        due = largest(deficits[:, orphans.atoms], self._shares[orphans.atoms])
         rows = np.arange(len(own))
         for i in orphans.places:
             separation = self.interface.separation(state, self.objects[i], orphans.column)
