@@ -12,7 +12,7 @@ UV_INSTALL := UV_FIND_LINKS="$$PIP_FIND_LINKS" UV_DEFAULT_INDEX="$$PIP_INDEX_URL
   UV_INDEX="$$PIP_EXTRA_INDEX_URL" $(BIN)/uv pip install --quiet --system-certs --python $(BIN)/python
 install_packages = $(UV_INSTALL) $(1) || $(PIP_INSTALL) $(1)
 NOT_COMPILED := /tests?/|/(pip|pkg_resources|pybullet_envs|pybullet_examples|pygments|setuptools)/|$\
-  /(debugpy|devtools|docutils|fontTools|mypy|mypyc|OpenGL|sympy/physics)/|$\
+  /(debugpy|devtools|docutils|fontTools|mypy|mypyc|networkx|OpenGL|scipy|sympy)/|$\
   /openai/(resources|types)/|/torch/(_inductor|distributed|onnx|testing)/
 COMPILE_LIBRARIES := $(BIN)/python -m compileall -qq -j 0 -x '$(NOT_COMPILED)' $(VENV)/lib || true  # some have files of other Pythons
 # No test should wait until motion planning is compiled. Half a second where it is.

@@ -35,7 +35,7 @@ def begin(index):
 @pytest.mark.slow
 @pytest.mark.timeout(600)  # a minute of learning, on a machine that nobody else uses
 def test_a_hammer_is_grasped_after_a_minute_of_learning(tmp_path):
-    settings = replace(AcquisitionSettings(), skill_steps=9_000)
+    settings = replace(AcquisitionSettings(), skill_steps=6_000)
     starts, fresh = (tuple(begin(first + i) for i in range(20)) for first in (0, 900_000))
     with local_workers(1) as workers:  # in a process of its own, as always: worlds take memory
         states = InitiationStates(starts, ()), InitiationStates(fresh, ())
