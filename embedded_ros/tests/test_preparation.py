@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is prepared is not worked out anew by a node."""
 
+import os
 import subprocess
 import sys
+
+import pytest
 
 NODE = """
 from cyclonedds.idl import _main, _xt_builder
@@ -26,12 +29,51 @@ rclpy.shutdown()
 """
 
 
-def test_a_nodes_topics_need_nothing_that_was_not_prepared():
-    ran = subprocess.run([sys.executable, "-c", NODE], capture_output=True, text=True, timeout=30)
+def run(code, cache):
+    environment = os.environ | {"XDG_CACHE_HOME": str(cache)}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=30)
+
+
+def test_a_nodes_topics_need_nothing_that_was_not_prepared(tmp_path):
+    ran = run(NODE, tmp_path)
     assert ran.stdout == "made\n", ran.stderr
 
 
-def test_an_interface_that_was_not_prepared_is_missed():
+def test_an_interface_that_was_not_prepared_is_missed(tmp_path):
     code = NODE.replace("prepare([Fibonacci, String, Trigger])", "prepare([Fibonacci, Trigger])")
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
-    assert "NoneType" in ran.stderr
+    assert "NoneType" in run(code, tmp_path).stderr
+
+
+def test_another_process_needs_no_preparation(tmp_path):
+    assert run(NODE, tmp_path).stdout == "made\n"
+    unprepared = NODE.replace("prepare([Fibonacci, String, Trigger])", "")
+    ran = run(unprepared, tmp_path)
+    assert ran.stdout == "made\n", ran.stderr
+
+
+TOLD = """
+from std_srvs.srv import Trigger
+from embedded_ros.transport.descriptors import topic_descriptor
+
+descriptor = topic_descriptor(f"{Trigger.ros_type}_Response", service=True)
+print(*(part.hex() for part in descriptor.__idl__._xt_bytedata))
+"""
+
+
+@pytest.mark.parametrize("damage", [lambda _: b"", lambda whole: whole[:-1], bytes.swapcase])
+def test_damage_is_noticed_and_mended(tmp_path, damage):
+    told = run(TOLD, tmp_path).stdout
+    assert told.strip()
+    (file,) = (path for path in tmp_path.rglob("*") if path.is_file())
+    whole = file.read_bytes()
+    assert run(TOLD, tmp_path).stdout == told
+    file.write_bytes(damage(whole))
+    assert run(TOLD, tmp_path).stdout == told
+    assert file.read_bytes() == whole
+
+
+def test_nothing_is_needed_on_disk(tmp_path):
+    nowhere = tmp_path / "file"
+    nowhere.write_text("")
+    assert run(TOLD, nowhere).stdout == run(TOLD, tmp_path / "cache").stdout != ""

@@ -12,7 +12,6 @@ from tempfile import TemporaryDirectory
 from time import monotonic, sleep
 from typing import Any
 
-from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.cli.event_printer import EventPrinter
 from ensemble.cli.live import Dashboard
 from ensemble.cli.run_options import RunOptions
@@ -205,6 +204,9 @@ def _acquisition(options: RunOptions) -> dict[str, str | int | float] | None:
     """The parameters of the acquisition node; None where it is not to run."""
     if not options.acquire:
         return None
+    # What talks to models and learns takes a fifth of this command's imports.
+    from ensemble.acquisition_parameters import AcquisitionParameters
+
     return parse_parameters(options.acquisition, AcquisitionParameters, "acquisition")
 
 

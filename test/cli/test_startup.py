@@ -88,6 +88,10 @@ def test_a_run_is_refused_before_reports_and_language_models_are_imported():
     assert not slap("run", "--help") & (LEARNING | OTHERS | LG_SAIL | STUDIES)
 
 
+def test_a_run_that_acquires_nothing_asks_nobody():
+    assert not modules_after("import ensemble.cli.run_task") & (LEARNING | OTHERS | LG_SAIL)
+
+
 @pytest.mark.parametrize("node", NODES)
 def test_a_node_imports_what_every_domain_needs(node):
     modules = modules_after(f"import {node}.node")

@@ -2,15 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node's topics need of their types, built before there is a node.
 
-CycloneDDS describes a type to other participants, and works that description out in Python when a
-process has its first topic of the type: half of what a node takes to start. Who forks processes of
-nodes does it once for all of them.
+It is a third of what a node takes to start. Who forks processes of nodes does it once for all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable
 
 from embedded_ros.transport import descriptors, discovery
 from embedded_ros.types import service_class
@@ -34,27 +31,23 @@ def prepare(interfaces: Iterable[type]) -> None:
     Args:
         interfaces: Classes of messages, services and actions.
     """
-    for descriptor in _descriptors(interfaces):
-        descriptor.__idl__.fill_type_data()
-
-
-def _descriptors(interfaces: Iterable[type]) -> Iterator[Any]:
-    yield from map(descriptors.message_descriptor, MESSAGES)
+    for full_name in MESSAGES:
+        descriptors.topic_descriptor(full_name, service=False)
     for name in PARAMETER_SERVICES.values():
-        yield from _of_service(service_class(f"rcl_interfaces/srv/{name}"))
+        _prepare_service(service_class(f"rcl_interfaces/srv/{name}"))
     for interface in interfaces:
         if issubclass(interface, Action):
             parts = interface.Impl
             for service in (parts.SendGoalService, parts.GetResultService, parts.CancelGoalService):
-                yield from _of_service(service)
+                _prepare_service(service)
             for message in (parts.FeedbackMessage, parts.GoalStatusMessage):
-                yield descriptors.message_descriptor(message.ros_type)
+                descriptors.topic_descriptor(message.ros_type, service=False)
         elif issubclass(interface, Service):
-            yield from _of_service(interface)
+            _prepare_service(interface)
         elif issubclass(interface, Message):
-            yield descriptors.message_descriptor(interface.ros_type)
+            descriptors.topic_descriptor(interface.ros_type, service=False)
 
 
-def _of_service(service: type[Service]) -> Iterator[Any]:
+def _prepare_service(service: type[Service]) -> None:
     for part in ("Request", "Response"):
-        yield descriptors.service_message_descriptor(f"{service.ros_type}_{part}")
+        descriptors.topic_descriptor(f"{service.ros_type}_{part}", service=True)

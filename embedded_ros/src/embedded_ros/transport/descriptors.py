@@ -14,10 +14,10 @@ from typing import Any
 from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl import types as idl
 
-from ..types import InterfaceError, catalogue
+from ..types import InterfaceError, catalogue, message_type_hash
 from ..types.hashing import wire_fields
 from ..types.model import FieldType, Shape
-from . import names
+from . import names, type_descriptions
 
 _PRIMITIVES: dict[str, Any] = {
     "bool": bool,
@@ -50,6 +50,21 @@ def message_descriptor(full_name: str) -> Any:
 def service_message_descriptor(full_name: str) -> Any:
     """The descriptor of a service's request or response, with the header that precedes it."""
     return _descriptor(full_name, _SERVICE_HEADER)
+
+
+def topic_descriptor(full_name: str, *, service: bool) -> Any:
+    """The descriptor of a topic's type, which knows what others are told of it.
+
+    Args:
+        full_name: The message's name.
+        service: Whether the topic is one of a service.
+    """
+    of_kind = service_message_descriptor if service else message_descriptor
+    descriptor = of_kind(full_name)
+    type_descriptions.describe(
+        descriptor, f"{message_type_hash(full_name)}{'_in_service' * service}"
+    )
+    return descriptor
 
 
 def _descriptor(full_name: str, header: dict[str, Any]) -> Any:

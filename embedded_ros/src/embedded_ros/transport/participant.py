@@ -213,11 +213,7 @@ class Participant:
     def _topic(self, name: str, full_name: str, *, service: bool) -> Topic[Any]:
         key = (name, full_name)
         if key not in self._topics:
-            descriptor = (
-                descriptors.service_message_descriptor(full_name)
-                if service
-                else descriptors.message_descriptor(full_name)
-            )
+            descriptor = descriptors.topic_descriptor(full_name, service=service)
             self._topics[key] = Topic(self._open_entity(), name, descriptor)
         return self._topics[key]
 
