@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 MAX_BYTES = 64 * 2**20  # of a file that is read at once, where its reader states no other limit
 JSON_LINE = 1000  # characters, beside the indentation: what fits, as most trials do, is not broken
 MAX_YAML_INTEGER = 100  # characters; Python prints no integer of more than 4,300 digits
+MAX_YAML_DEPTH = 100  # collections within collections; document and stream count as well
 MAX_YAML_NODES = 200_000  # with what is repeated by reference counted as often as it is repeated
 # What PyYAML raises where a scalar is not of the kind that its tag says, beside its own errors.
 SCALAR_ERRORS = (RecursionError, LookupError, TypeError, AttributeError)
@@ -266,8 +267,11 @@ def parse_yaml(text: str) -> Any:
     """
     import yaml  # few files are read as YAML, and all are read by this module
 
+    # In C it takes a sixth of the time; not every PyYAML has that.
+    loading = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
-        loader = yaml.SafeLoader(text)
+        _require_shallow(yaml.parse(text, loading))
+        loader = loading(text)
         try:
             node = loader.get_single_node()
             if node is None:
@@ -283,6 +287,16 @@ def parse_yaml(text: str) -> Any:
             loader.dispose()
     except (yaml.YAMLError, *SCALAR_ERRORS) as error:
         raise ValueError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
+
+
+def _require_shallow(events: Iterable[yaml.Event]) -> None:
+    """Refuse what is nested deep, for which code in C would overflow the stack."""
+    depth = 0
+    for event in events:
+        kind = type(event).__name__
+        depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
+        if depth > MAX_YAML_DEPTH:
+            raise ValueError(f"no YAML: nested deeper than {MAX_YAML_DEPTH}")
 
 
 def _require_distinct_keys(nodes: Iterable[yaml.Node]) -> None:

@@ -109,6 +109,7 @@ def bomb(merge):
         "[" * 900 + "]" * 900,
         "{a: " * 200_000,
         "- " * 100_000,
+        "? " * 200_000,
         bomb(merge=False),
         bomb(merge=True),
         "&a [*a]",
@@ -120,7 +121,7 @@ def bomb(merge):
         "\x00",
         "!!python/name:os.system",
     ],
-    ids=range(14),
+    ids=range(15),
 )
 def test_yaml_that_is_no_plain_data_is_refused(text):
     with pytest.raises(ValueError, match=r"YAML|values|limit"):
