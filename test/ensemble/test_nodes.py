@@ -342,12 +342,13 @@ def victim_of(runner, victim, bag):
 
     end = time.monotonic() + 3 * LIMIT
     while time.monotonic() < end:
-        children = psutil.Process(runner).children(recursive=True)
-        with suppress(psutil.NoSuchProcess):  # what looks at the machine comes and goes
-            pids = [child.pid for child in children if child.name() == victim]
         recorded = sum(f.stat().st_size for f in bag.glob("*.mcap")) if bag.exists() else 0
-        if pids and recorded > 40_000:  # of some 90,000: long before the end
-            return pids[0]
+        if recorded > 40_000:  # of some 90,000: long before the end
+            children = psutil.Process(runner).children(recursive=True)
+            with suppress(psutil.NoSuchProcess):  # what looks at the machine comes and goes
+                pids = [child.pid for child in children if child.name() == victim]
+                if pids:
+                    return pids[0]
         time.sleep(0.002)
     raise AssertionError("the run did not get under way")
 
