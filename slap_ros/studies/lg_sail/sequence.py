@@ -38,11 +38,12 @@ default): the product of the success of the plan's skills, from states that plan
 rounds of training, and at the end, whole plans are carried out instead. *All steps* go on until
 enough tasks are solved three judgements in a row (the setting `solved`, .8 by default), the last of
 whole plans, until nothing fails, or until the budget is spent. Steps are of all skills together,
-the mean ± sample standard deviation over sequences; a cell has a ≥ where a sequence never came to
-.8 at a goal, and its whole length counts. A sequence that has not come to its last goal counts as
-far as it came. *Solved* is the share of tasks, which training never sees, whose stages were all
-done right after the goal was learned. For all goals before, it is given as it is now, and as it was
-right after each of these was learned. Judgements and trials are not counted as steps."""
+the mean ± sample standard deviation over sequences, where there are several; a cell has a ≥ where a
+sequence never came to .8 at a goal, and its whole length counts. A sequence that has not come to
+its last goal counts as far as it came. *Solved* is the share of tasks, which training never sees,
+whose stages were all done right after the goal was learned. For all goals before, it is given as it
+is now, and as it was right after each of these was learned. Judgements and trials are not counted
+as steps."""
 SEQUENCES = "runs/sequences"
 CARRIED, SCRATCH = "carried on", "from scratch"
 
@@ -159,16 +160,19 @@ def _row(kind: str, goal: GoalOfSequence) -> list[str]:
         kind,
         goal.goal,
         str(len(goal.steps)),
-        ("" if goal.reached == len(goal.steps) else "≥ ") + _spread(goal.level_steps),
-        _spread(goal.steps),
-        format_spread(Spread.of(goal.solved), 2),
-        format_spread(Spread.of(goal.kept), 2) if goal.kept else "-",
-        format_spread(Spread.of(goal.before), 2) if goal.before else "-",
+        ("" if goal.reached == len(goal.steps) else "≥ ") + _spread(goal.level_steps, 0),
+        _spread(goal.steps, 0),
+        _spread(goal.solved, 2),
+        _spread(goal.kept, 2),
+        _spread(goal.before, 2),
     ]
 
 
-def _spread(steps: Sequence[int]) -> str:
-    return format_spread(Spread.of([float(count) for count in steps]), 0)
+def _spread(values: Sequence[float], digits: int) -> str:
+    """Mean ± sample standard deviation; one value as it is, and a dash where there are none."""
+    if len(values) == 1:
+        return f"{values[0]:.{digits}f}"
+    return format_spread(Spread.of(values) if values else None, digits)
 
 
 def draw(figure: Figure, kinds: Mapping[str, Sequence[GoalOfSequence]]) -> None:
@@ -190,10 +194,18 @@ def _summary(found: Data) -> str:
     said = [
         f"{kind}: {share:.2f} of the first goal's steps for each later one"
         + (f", {kept[kind]:.2f} of the success kept" if kind == CARRIED and kept[kind] else "")
+        + _missed(found["sequences"][kind])
         for kind, share in shares.items()
         if share is not None
     ]
     return "; ".join(said) or "nothing was learned for the first goal"
+
+
+def _missed(sequences: Sequence[Sequence[Data]]) -> str:
+    """The goals at which a sequence never came to .8, whose steps are too few for that."""
+    steps = [step for sequence in sequences for step in sequence if not step["reached"]]
+    missed = sorted({step["goal"] for step in steps})
+    return f", never .8 of {', '.join(missed)}" if missed else ""
 
 
 @dataclass(frozen=True, kw_only=True)
