@@ -86,6 +86,18 @@ def test_a_sequence_that_has_not_come_to_its_end_counts_as_far_as_it_came(tmp_pa
     assert "different goals" in " ".join(refused.stderr.split())
 
 
+def test_what_earlier_goals_cost_again_is_counted_with_the_goal_after_which_they_were(tmp_path):
+    folder = sequence(tmp_path / "0", (1000, 200), ((1.0,), (0.9, 1.0)))
+    about = json.loads((folder / "library.json").read_text())
+    about["sequence"]["relearn"] = True
+    about["sequence"]["goals"][1]["again"] = {"task0": 50}
+    (folder / "library.json").write_text(json.dumps(about))
+    ran = study("--library", folder, "--output", tmp_path / "out")
+    assert ran.exit_code == 0, ran.output
+    page = (tmp_path / "out" / "sequence_groceries.md").read_text()
+    assert "| carried on, relearned | task1 | 1 | 250 | 450 | 1.00 | 0.90 | 1.00 |" in page
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
