@@ -149,6 +149,16 @@ def test_each_goal_leaves_a_library_of_the_sequence_so_far(tmp_path):
     assert "--steps 200 --set rollouts=2 --set validation=2" in sequence["command"]
 
 
+@pytest.mark.training
+def test_from_scratch_no_goal_begins_with_what_another_learned(tmp_path):
+    work = tmp_path / "library-training"
+    steps = acquire_sequence(tiny(tmp_path / "library", scratch=True), None, None, UNWATCHED)
+    assert [step.retrieved for step in steps] == [{}, {}]
+    rounds = [rounds_in(work / goal / "training" / "Pick") for goal in ("0-train", "1-swapped")]
+    assert [len(of_goal) for of_goal in rounds] == [1, 1]
+    assert load_skill_library(tmp_path / "library", POINTS).record["sequence"]["scratch"]
+
+
 @pytest.mark.parametrize(
     ("changes", "solved"), [(("patience=3",), 0.8), (("solved=0.9", "patience=3"), 0.9)]
 )
