@@ -6,12 +6,14 @@ Each goal of a sequence is an acquisition of its own, which keeps the library of
 skills that carry out the new goal are used as they are, and learned further where they fail: their
 trainings go on, with critics, replay buffers and some of the states of earlier goals. A goal is
 over once three judgements in a row had .8 of its tasks solved, unless the setting ``solved`` says
-otherwise. After each, all goals so far are tried, so that what was forgotten shows. A work folder
-has::
+otherwise. After each, all goals so far are tried, so that what was forgotten shows; where it is
+asked for, goals that are not done any more are then learned again. A work folder has::
 
-    0-task0/library, 0-task0/training    the library after the first goal, and its work folder
-    0-task0/tried.json                   what comes of plans for all goals so far with that library
-    0-task0/.tried.jsonl                 the same for each goal, while others are being tried
+    1-task1/library, 1-task1/training    the library after the second goal, and its work folder
+    1-task1/tried.json                   what comes of plans for all goals so far with that library
+    1-task1/.tried.jsonl                 the same for each goal, while others are being tried
+    1-task1/again-task0                  the same for the first goal, where it is learned again then
+    1-task1/tried_again.json             what comes of plans for all goals after that
 
 Interrupted at any time, the same sequence goes on from there. After each goal, its library is also
 that of the whole sequence so far.
@@ -21,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -31,17 +33,15 @@ from slap_ros.acquisition.curriculum.curriculum_folder import CurriculumFolder
 from slap_ros.acquisition.curriculum.jobs import horizon_of
 from slap_ros.acquisition.curriculum.rollouts import roll_out
 from slap_ros.acquisition.curriculum.solved_shares import Point
-from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.acquisition.training.skill_training import ENOUGH_IN_A_ROW
 from slap_ros.api.acquisition import AcquisitionWatch, carry_out
 from slap_ros.api.acquisition_request import AcquisitionRequest
-from slap_ros.api.command_line import command_line
 from slap_ros.api.jobs import some_workers
 from slap_ros.api.learning_curves import PLAN, CurveCallback, steps_to
+from slap_ros.api.sequence_request import LEVEL, SequenceRequest
+from slap_ros.api.sequence_step import KnownStart, SequenceStep
 from slap_ros.core.goals import task_with_goal
-from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
-from slap_ros.learning.setting_changes import parse_changes
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import run_in_order
 from slap_ros.skills.domain_choice import DomainChoice
@@ -49,157 +49,8 @@ from slap_ros.skills.skill import LearnedSkill
 from slap_ros.skills.skill_library import SkillLibrary, save_skill_library
 
 SEQUENCE_SEED = 400  # seed of the tasks that goals are tried in; training and studies use others
-LEVEL = 0.8  # share of tasks that are solved up to which steps are counted, as in the paper
 
 _Tries = Mapping[str, list[float]]  # task progress of each task, by goal
-
-
-@dataclass(frozen=True)
-class SequenceRequest:
-    """A sequence of goals, and how skills are acquired for them.
-
-    Args:
-        acquisition: Request for the acquisitions, whose goal and library to keep do not count; its
-            folders are those of the whole sequence. A goal is done at ``LEVEL`` where its changes
-            do not say at which share of ``solved`` tasks.
-        goals: Names of the goals, or atoms, in their order; two at least.
-        scratch: Whether every goal is learned from scratch, for comparison.
-        tasks: Number of tasks per goal in which all goals so far are tried after each.
-
-    Raises:
-        InvalidParameterError: There are fewer than two goals, or one twice.
-    """
-
-    acquisition: AcquisitionRequest
-    goals: Sequence[str]
-    scratch: bool = False
-    tasks: int = 20
-
-    def __post_init__(self) -> None:
-        domain = self.acquisition.domain
-        if len(self.goals) < 2:
-            raise InvalidParameterError(
-                f"a sequence has two goals at least; {domain.name} has "
-                f"{', '.join(domain.goals) or 'none by name'}: give more with --goal"
-            )
-        if len(set(self.goals)) < len(self.goals):
-            raise InvalidParameterError("a goal stands twice in the sequence; leave one out")
-
-    @property
-    def command(self) -> str:
-        """The command that acquires the same library again."""
-        base = self.acquisition
-        own = list(self.goals) == list(base.domain.goals)
-        return command_line(
-            "acquire-sequence",
-            base.domain.name,
-            preset=base.domain.preset,
-            goal=None if own else list(self.goals),
-            seed=base.seed,
-            scratch=self.scratch or None,
-            tasks=self.tasks,
-            settings=base.settings,
-            steps=base.steps,
-            set=list(base.changes) or None,
-        )
-
-    def acquisition_of(self, number: int) -> AcquisitionRequest:
-        """The request for the acquisition of a goal.
-
-        Args:
-            number: Number of the goal, from 0.
-
-        Raises:
-            InvalidParameterError: The settings cannot be changed so.
-        """
-        base, folder = self.acquisition, self.folder(number)
-        given = parse_changes(base.changes, AcquisitionSettings)
-        done = () if "solved" in given else (f"solved={LEVEL}",)
-        return replace(
-            base,
-            goal=self.goals[number],
-            changes=(*done, *base.changes),
-            keep=self.folder(number - 1) / "library" if number and not self.scratch else None,
-            library_folder=folder / "library",
-            work_folder=folder / "training",
-        )
-
-    def folder(self, number: int) -> Path:
-        """The folder of a goal.
-
-        Args:
-            number: Number of the goal, from 0.
-        """
-        return self.acquisition.work_folder / f"{number}-{_file_name(self.goals[number])}"
-
-
-@dataclass(frozen=True)
-class KnownStart:
-    """A known skill that another one began with.
-
-    Args:
-        skill: Name and digest of the known skill.
-        success: Success rate of the known skill before anything was learned.
-    """
-
-    skill: str
-    success: float
-
-
-@dataclass(frozen=True)
-class SequenceStep:
-    """What came of one goal of a sequence.
-
-    Args:
-        goal: Name of the goal, or its atoms.
-        steps: Environment steps learned for it, all skills together.
-        steps_to_level: Environment steps after which ``ENOUGH_IN_A_ROW`` judgements in a row first
-            had ``LEVEL`` of the tasks solved; see
-            :class:`~slap_ros.acquisition.curriculum.solved_shares.SolvedShares`.
-        reached: Whether they ever had; else ``steps_to_level`` are all steps.
-        learned: Environment steps of each skill that was learned further, by operator.
-        retrieved: Known skill that each of these began with, and its success before, by operator.
-        ended: Reason why its acquisition was over, in words.
-        tried: Task progress on each goal so far, this one last, by goal.
-        solved: Share of the tasks that were solved, for the same goals.
-    """
-
-    goal: str
-    steps: int
-    steps_to_level: int
-    reached: bool
-    learned: Mapping[str, int]
-    retrieved: Mapping[str, KnownStart]
-    ended: str
-    tried: Mapping[str, float] = field(default_factory=dict)
-    solved: Mapping[str, float] = field(default_factory=dict)
-
-    def as_json(self) -> dict[str, Any]:
-        """A JSON object."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> SequenceStep:
-        """The step of :meth:`as_json`.
-
-        Raises:
-            LookupError, TypeError, ValueError: The data is no step.
-        """
-        return cls(
-            str(data["goal"]),
-            int(data["steps"]),
-            int(data["steps_to_level"]),
-            bool(data["reached"]),
-            {str(name): int(steps) for name, steps in dict(data["learned"]).items()},
-            {str(name): KnownStart(**one) for name, one in dict(data["retrieved"]).items()},
-            str(data["ended"]),
-            _numbers(data["tried"]),
-            _numbers(data["solved"]),
-        )
-
-
-def _numbers(data: Any) -> dict[str, float]:
-    return {str(goal): float(value) for goal, value in dict(data).items()}
 
 
 def acquire_sequence(
@@ -228,30 +79,139 @@ def acquire_sequence(
         InvalidParameterError: The work folder has another sequence, or is damaged.
     """
     base = request.acquisition
-    WorkFolder(base.work_folder).require_same(_described(request))
+    WorkFolder(base.work_folder).require_same(request.as_json())
     steps: list[SequenceStep] = []
-    library = SkillLibrary(base.domain.name)
-    known: _Tries = {}
-    trainings: dict[str, Path] = {}
+    learner = _SequenceLearner(request, jobs, ray, watch)
     for number, goal in enumerate(request.goals):
         on_goal(number, goal)
-        before = library if not request.scratch else SkillLibrary(base.domain.name)
-        acquisition = replace(request.acquisition_of(number), continued=dict(trainings))
-        library, measured = _one_goal(acquisition, jobs, ray, watch)
-        if not request.scratch:
-            trainings |= _trainings_of(acquisition, before, library)
-        known = known if library.digest == before.digest else {}
-        known = _tried(request, number, known, jobs, watch)
-        steps.append(_step(goal, before, library.record, measured, known))
+        if request.scratch:
+            learner = _SequenceLearner(request, jobs, ray, watch)
+        before, folder = learner.library, request.folder(number)
+        measured = learner.learn(goal, folder)
+        record = learner.library.record
+        learner.try_goals(request.goals[: number + 1], folder, "tried")
+        step = _step(goal, before, record, measured, learner.tries)
+        if request.relearn:
+            step = _relearn(request, number, learner, step, on_goal)
+        steps.append(step)
         sequence = {
             "command": request.command,
             "scratch": request.scratch,
+            "relearn": request.relearn,
             "goals": [step.as_json() for step in steps],
             "to_come": list(request.goals[number + 1 :]),
         }
-        record = {**library.record, "sequence": sequence}
-        save_skill_library(base.library_folder, replace(library, record=record))
+        record = {**learner.library.record, "sequence": sequence}
+        save_skill_library(base.library_folder, replace(learner.library, record=record))
     return steps
+
+
+@dataclass
+class _SequenceLearner:
+    """What a sequence has learned so far, and what learns more.
+
+    Args:
+        request: Request of the sequence.
+        jobs: Number of processes; None for this one.
+        ray: Address of a Ray cluster to run on instead.
+        watch: Functions that are called while skills are acquired.
+        folder: Folder of the library; None for one without skills.
+        library: Library of all that was learned so far.
+        trainings: Folders of the trainings of its skills, by operator name.
+        tries: Task progress of each task tried with the library, by goal.
+    """
+
+    request: SequenceRequest
+    jobs: int | None
+    ray: str | None
+    watch: AcquisitionWatch
+    folder: Path | None = None
+    library: SkillLibrary = field(init=False)
+    trainings: dict[str, Path] = field(default_factory=dict)
+    tries: dict[str, list[float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.library = SkillLibrary(self.request.acquisition.domain.name)
+
+    def learn(self, goal: str, folder: Path) -> CurveCallback:
+        """Carry the library on for a goal.
+
+        Args:
+            goal: Name of the goal, or its atoms.
+            folder: Folder of the goal.
+
+        Returns:
+            What was measured meanwhile.
+        """
+        asked = self.request.acquisition_of(goal, folder, self.folder)
+        asked = replace(asked, continued=dict(self.trainings))
+        before = self.library
+        self.library, measured = _one_goal(asked, self.jobs, self.ray, self.watch)
+        self.folder = asked.library_folder
+        self.trainings |= _trainings_of(asked, before, self.library)
+        if self.library.digest != before.digest:
+            self.tries = {}
+        return measured
+
+    def try_goals(self, goals: Sequence[str], folder: Path, name: str) -> None:
+        """Try goals, but those that were tried with the same library before.
+
+        Args:
+            goals: Names of the goals, or their atoms.
+            folder: Folder of the latest goal.
+            name: Name of the results' file in it, without its ending.
+        """
+        domain, known = self.request.acquisition.domain, self.tries
+        choice = DomainChoice(domain.name, domain.preset, str(self.folder))
+
+        def carry_out_plans(finished: FinishedJobs) -> dict[str, list[float]]:
+            new = [goal for goal in goals if goal not in known]
+            work = [(choice, goal, self.request.tasks) for goal in new]
+            with some_workers(self.jobs) as workers, self.watch.curriculum() as callback:
+                found = run_in_order(
+                    workers, try_goal, work, "trying all goals", callback, finished
+                )
+            return {**known, **dict(zip(new, found, strict=True))}
+
+        def read(data: Any) -> dict[str, list[float]]:
+            return {goal: list(map(float, data[goal])) for goal in goals}
+
+        self.tries = cached_jobs(WorkFolder(folder), name, carry_out_plans, read)
+
+
+def _relearn(
+    request: SequenceRequest,
+    number: int,
+    learner: _SequenceLearner,
+    step: SequenceStep,
+    on_goal: Callable[[int, str], None],
+) -> SequenceStep:
+    """Learn earlier goals again that are not done any more, each once, and try all of them again.
+
+    Plans for them are carried out in the tasks of training, and skills learned from where they
+    fail, as when a goal is new.
+
+    Args:
+        request: Request of the sequence.
+        number: Number of the latest goal, from 0.
+        learner: What has learned it.
+        step: What came of it.
+        on_goal: Function that receives the number of each goal that is learned again, and the goal.
+
+    Returns:
+        What came of the goal with the library that is carried on now.
+    """
+    again = {}
+    for earlier, goal in enumerate(request.goals[:number]):
+        if step.solved[goal] >= request.solved:
+            continue
+        on_goal(earlier, goal)
+        learner.learn(goal, request.folder_again(number, goal))
+        again[goal] = int(learner.library.record["steps"])
+    if not again:
+        return step
+    learner.try_goals(request.goals[: number + 1], request.folder(number), "tried_again")
+    return replace(step, again=again, tried=_means(learner.tries), solved=_solved(learner.tries))
 
 
 def _trainings_of(
@@ -273,16 +233,6 @@ def _trainings_of(
     }
 
 
-def _described(request: SequenceRequest) -> dict[str, Any]:
-    """All that the results depend on, as JSON."""
-    return {
-        "acquisition": replace(request.acquisition_of(0), goal=None, keep=None).command,
-        "goals": list(request.goals),
-        "scratch": request.scratch,
-        "tasks": request.tasks,
-    }
-
-
 def _step(
     goal: str,
     before: SkillLibrary,
@@ -299,7 +249,7 @@ def _step(
         measured: Measurements of the acquisition.
         tries: What came of the tasks of all goals so far with that library.
     """
-    solved = {name: fmean(one == 1.0 for one in tasks) for name, tasks in tries.items()}
+    solved = _solved(tries)
     judged = [*measured.solved.points, Point(record["steps"], solved[goal])]
     steps, reached = steps_to(judged, LEVEL, ENOUGH_IN_A_ROW)
     known = {skill.operator.name: skill.folder_name for skill in before.skills}
@@ -316,9 +266,17 @@ def _step(
             if name in known
         },
         record["ended"],
-        {name: fmean(tasks) for name, tasks in tries.items()},
+        _means(tries),
         solved,
     )
+
+
+def _means(tries: _Tries) -> dict[str, float]:
+    return {goal: fmean(tasks) for goal, tasks in tries.items()}
+
+
+def _solved(tries: _Tries) -> dict[str, float]:
+    return {goal: fmean(task == 1.0 for task in tasks) for goal, tasks in tries.items()}
 
 
 def _one_goal(
@@ -336,35 +294,6 @@ def _one_goal(
 
     library = carry_out(acquisition, jobs, ray, replace(watch, curriculum=watched))
     return library, curves[-1]
-
-
-def _tried(
-    request: SequenceRequest, number: int, known: _Tries, jobs: int | None, watch: AcquisitionWatch
-) -> dict[str, list[float]]:
-    """What comes of the tasks of all goals up to one, with the library after it.
-
-    Args:
-        request: Request of the sequence.
-        number: Number of the goal.
-        known: What came of goals before with the same library, which would be the same again.
-        jobs: Number of processes; None for this one.
-        watch: Functions that are called.
-    """
-    base, folder, goals = request.acquisition.domain, request.folder(number), request.goals
-    so_far = goals[: number + 1]
-
-    def try_goals(finished: FinishedJobs) -> dict[str, list[float]]:
-        choice = DomainChoice(base.name, base.preset, str(folder / "library"))
-        new = [goal for goal in so_far if goal not in known]
-        work = [(choice, goal, request.tasks) for goal in new]
-        with some_workers(jobs) as workers, watch.curriculum() as callback:
-            found = run_in_order(workers, try_goal, work, "trying all goals", callback, finished)
-        return {**known, **dict(zip(new, found, strict=True))}
-
-    def read(data: Any) -> dict[str, list[float]]:
-        return {goal: list(map(float, data[goal])) for goal in so_far}
-
-    return cached_jobs(WorkFolder(folder), "tried", try_goals, read)
 
 
 def try_goal(choice: DomainChoice, goal: str, tasks: int) -> list[float]:
@@ -391,9 +320,3 @@ def try_goal(choice: DomainChoice, goal: str, tasks: int) -> list[float]:
         for index in range(tasks)
     ]
     return [rollout.progress for rollout in rollouts]
-
-
-def _file_name(goal: str) -> str:
-    """A goal as the name of a file: letters and digits of it, and what is between them as one."""
-    words = "".join(letter if letter.isalnum() else " " for letter in goal).split()
-    return "-".join(words)[:60]

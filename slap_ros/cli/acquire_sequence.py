@@ -15,8 +15,10 @@ from slap_ros.acquisition.curriculum.jobs import horizon_of
 from slap_ros.acquisition.training.settings import ACQUISITION_SETTINGS
 from slap_ros.api.acquisition import AcquisitionWatch, acquirable, require_budget
 from slap_ros.api.acquisition_request import AcquisitionRequest
-from slap_ros.api.acquisition_sequence import SequenceRequest, SequenceStep, acquire_sequence
+from slap_ros.api.acquisition_sequence import acquire_sequence
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.sequence_request import SequenceRequest
+from slap_ros.api.sequence_step import SequenceStep
 from slap_ros.api.training import training_folder
 from slap_ros.cli.acquisition_bars import AcquisitionBars
 from slap_ros.cli.acquisition_events import AcquisitionEvents
@@ -56,6 +58,14 @@ class SequenceOptions:
         bool,
         typer.Option("--scratch", help="Learn every goal from scratch, for comparison."),
     ] = False
+    relearn: Annotated[
+        bool,
+        typer.Option(
+            "--relearn",
+            help="After each goal, learn earlier goals again of whose tasks fewer than .8 are "
+            "solved then, or fewer than --set solved says.",
+        ),
+    ] = False
     tasks: Annotated[
         int, CommandOption("Number of tasks per goal to try all goals so far in.", least=1)
     ] = 20
@@ -92,7 +102,7 @@ class SequenceOptions:
             steps=self.steps,
         )
         goals = self.goal or list(domain.goals)
-        return SequenceRequest(acquisition, goals, self.scratch, self.tasks)
+        return SequenceRequest(acquisition, goals, self.scratch, self.tasks, self.relearn)
 
 
 def acquire_sequence_command(options: SequenceOptions) -> int:

@@ -53,6 +53,7 @@ PANELS: Mapping[str, str] = {
             "encoder",
             "keep",
             "scratch",
+            "relearn",
             "trajectories",
         ),
         LEARNING,

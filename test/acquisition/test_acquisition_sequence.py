@@ -15,7 +15,8 @@ from slap_ros.acquisition.training.skill_training import rounds_in
 from slap_ros.api import acquisition_sequence
 from slap_ros.api.acquisition import AcquisitionWatch, UnwatchedCurriculum, acquirable
 from slap_ros.api.acquisition_request import AcquisitionRequest
-from slap_ros.api.acquisition_sequence import SequenceRequest, acquire_sequence
+from slap_ros.api.acquisition_sequence import acquire_sequence
+from slap_ros.api.sequence_request import SequenceRequest
 from slap_ros.cli import app
 from slap_ros.skills.skill_library import load_skill_library
 from support.points import POINTS
@@ -56,7 +57,9 @@ def test_a_second_goal_is_learned_with_the_skills_of_the_first(tmp_path, monkeyp
     record = json.loads((tmp_path / "library" / "library.json").read_text())
     made_by = record["sequence"].pop("command")
     assert made_by.startswith("slap acquire-sequence points --preset")
-    assert record["sequence"] == {"scratch": False, "goals": steps, "to_come": []}
+    assert record["sequence"] == {
+        "scratch": False, "relearn": False, "goals": steps, "to_come": []
+    }  # fmt: skip
     monkeypatch.setattr(jobs, "learn", None)  # nothing is learned when it is asked for again
     assert json.loads(sequence(*asked).stdout) == json.loads(ran.stdout)
     other = sequence(*asked, "--scratch")
@@ -89,7 +92,8 @@ class Interrupted(UnwatchedCurriculum):
 @pytest.mark.training
 def test_a_sequence_interrupted_within_its_goals_ends_as_one_that_was_not(tmp_path, monkeypatch):
     """Whatever had ended is not done again, and all files are the same to the byte."""
-    whole = acquire_sequence(tiny(tmp_path / "whole" / "library"), None, None, UNWATCHED)
+    asked = tiny(tmp_path / "whole" / "library", relearn=True)
+    whole = acquire_sequence(asked, None, None, UNWATCHED)
     tried, interrupted = [], set()
     original = acquisition_sequence.try_goal
     monkeypatch.setattr(
@@ -99,18 +103,21 @@ def test_a_sequence_interrupted_within_its_goals_ends_as_one_that_was_not(tmp_pa
     steps = None
     while steps is None:
         with suppress(KeyboardInterrupt):
-            steps = acquire_sequence(tiny(tmp_path / "cut" / "library"), None, None, watch)
+            asked = tiny(tmp_path / "cut" / "library", relearn=True)
+            steps = acquire_sequence(asked, None, None, watch)
     assert steps == whole
     names = {what for what, _ in interrupted}
     assert {"carrying out plans", "learning skills", "trying all goals"} <= names
     assert [goal for _, goal, _ in tried] == ["train", "swapped"]  # the skills stay as they are
     assert files(tmp_path / "cut") == files(tmp_path / "whole")
-    first, second = (
+    first, second, again = (
         rounds_in(tmp_path / "whole" / "library-training" / goal / "training" / "Pick")
-        for goal in ("0-train", "1-swapped")
+        for goal in ("0-train", "1-swapped", "1-swapped/again-train")
     )
-    assert second[: len(first)] == first
-    assert len(second) > len(first)  # its training went on
+    for further in (second, again):  # its training went on
+        assert further[: len(first)] == first
+        assert len(further) > len(first)
+    assert whole[1].again == {"train": whole[0].steps}  # the budget: none of its tasks were solved
     earlier = tmp_path / "whole" / "library-training" / "0-train" / "training" / "Pick"
     rehearsed = earlier_starts(earlier, POINTS.types_by_name, 3)
     assert len(rehearsed) == len({start.state.data.tobytes() for start in rehearsed}) == 2  # tasks
@@ -142,17 +149,27 @@ def test_each_goal_leaves_a_library_of_the_sequence_so_far(tmp_path):
     assert "--steps 200 --set rollouts=2 --set validation=2" in sequence["command"]
 
 
+@pytest.mark.training
+def test_from_scratch_no_goal_begins_with_what_another_learned(tmp_path):
+    work = tmp_path / "library-training"
+    steps = acquire_sequence(tiny(tmp_path / "library", scratch=True), None, None, UNWATCHED)
+    assert [step.retrieved for step in steps] == [{}, {}]
+    rounds = [rounds_in(work / goal / "training" / "Pick") for goal in ("0-train", "1-swapped")]
+    assert [len(of_goal) for of_goal in rounds] == [1, 1]
+    assert load_skill_library(tmp_path / "library", POINTS).record["sequence"]["scratch"]
+
+
 @pytest.mark.parametrize(
     ("changes", "solved"), [(("patience=3",), 0.8), (("solved=0.9", "patience=3"), 0.9)]
 )
 def test_a_goal_is_done_at_the_papers_share_unless_it_is_said_otherwise(tmp_path, changes, solved):
     asked = tiny(tmp_path)
     asked = replace(asked, acquisition=replace(asked.acquisition, changes=changes))
-    settings = asked.acquisition_of(1).chosen_settings()
+    settings = asked.acquisition_of("swapped", tmp_path, None).chosen_settings()
     assert (settings.solved, settings.patience) == (solved, 3)
 
 
-def tiny(folder):
+def tiny(folder, **options):
     """A sequence in which hardly anything is learned."""
     acquisition = AcquisitionRequest(
         acquirable("points", None),
@@ -161,7 +178,7 @@ def tiny(folder):
         changes=TINY,
         steps=200,
     )
-    return SequenceRequest(acquisition, ("train", "swapped"), tasks=2)
+    return SequenceRequest(acquisition, ("train", "swapped"), tasks=2, **options)
 
 
 @pytest.mark.parametrize(
@@ -171,6 +188,7 @@ def tiny(folder):
         (("--goal", "train", "--goal", "train"), "stands twice"),
         (("--seeds", 0), "--seeds"),
         (("--steps", 10), "too few to learn anything"),
+        (("--scratch", "--relearn"), "leave out --scratch or --relearn"),
         (("--set", "sac.magic=1"), "sac.magic"),
     ],
 )

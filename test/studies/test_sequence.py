@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.studies.registry import STUDIES
 
 pytest.importorskip("matplotlib")
 GOALS = ("task0", "task1", "task2")
@@ -55,16 +56,17 @@ def test_later_goals_are_compared_with_the_first_and_forgetting_shows(tmp_path):
     found = json.loads((tmp_path / "out" / "sequence_groceries.json").read_text())["found"]
     assert found["later_over_first"] == {"carried on": 0.2, "from scratch": 1.0}
     assert found["kept_over_before"] == {"carried on": pytest.approx(5 / 7), "from scratch": 0.0}
+    assert STUDIES["sequence"].summary(found) == (
+        "carried on: 0.20 of the first goal's steps for each later one, 0.71 of the success kept, "
+        "never .8 of task2; from scratch: 1.00 of the first goal's steps for each later one"
+    )
     page = (tmp_path / "out" / "sequence_groceries.md").read_text()
     # after the third goal: (.75 + .25) / 2 and .75 of what was (1 + 1) / 2 and (1 + .5) / 2
     assert (
         "| carried on | task2 | 2 | ≥ 500 ± 283 | 1000 ± 566 | 1.00 ± 0.00 | 0.62 ± 0.18 | "
         "0.88 ± 0.18 |" in page
     )
-    assert (
-        "| from scratch | task2 | 1 | 900 ± 0 | 1800 ± 0 | 1.00 ± 0.00 | 0.00 ± 0.00 | "
-        "1.00 ± 0.00 |" in page
-    )
+    assert "| from scratch | task2 | 1 | 900 | 1800 | 1.00 | 0.00 | 1.00 |" in page
 
 
 def test_a_sequence_that_has_not_come_to_its_end_counts_as_far_as_it_came(tmp_path):
@@ -82,6 +84,18 @@ def test_a_sequence_that_has_not_come_to_its_end_counts_as_far_as_it_came(tmp_pa
     (other / "library.json").write_text(json.dumps(about))
     refused = study("--library", whole, "--library", other, "--output", tmp_path / "none")
     assert "different goals" in " ".join(refused.stderr.split())
+
+
+def test_what_earlier_goals_cost_again_is_counted_with_the_goal_after_which_they_were(tmp_path):
+    folder = sequence(tmp_path / "0", (1000, 200), ((1.0,), (0.9, 1.0)))
+    about = json.loads((folder / "library.json").read_text())
+    about["sequence"]["relearn"] = True
+    about["sequence"]["goals"][1]["again"] = {"task0": 50}
+    (folder / "library.json").write_text(json.dumps(about))
+    ran = study("--library", folder, "--output", tmp_path / "out")
+    assert ran.exit_code == 0, ran.output
+    page = (tmp_path / "out" / "sequence_groceries.md").read_text()
+    assert "| carried on, relearned | task1 | 1 | 250 | 450 | 1.00 | 0.90 | 1.00 |" in page
 
 
 @pytest.mark.parametrize(

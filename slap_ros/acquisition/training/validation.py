@@ -65,7 +65,6 @@ class SkillTrials:
         self._domain, self._initiations, self._horizon = domain, initiations, horizon
         groundings = list(dict.fromkeys(one.grounding for one in initiations))
         self._mdp = SkillMdp(domain, reward, Groundings(groundings))
-        self._worlds: dict[Layout, list[World]] = {}
 
     def success(self, act: Act) -> float:
         """Share of trials in which a policy succeeds."""
@@ -77,9 +76,10 @@ class SkillTrials:
         for number, initiation in enumerate(self._initiations):
             by_layout.setdefault(initiation.state.layout, []).append(number)
         for numbers in by_layout.values():
+            worlds: list[World] = []  # given back with the last: a simulation takes 36 MB
             for i in range(0, len(numbers), SIDE_BY_SIDE):
                 some = numbers[i : i + SIDE_BY_SIDE]
-                yield from zip(some, self._run(some, act), strict=True)
+                yield from zip(some, self._run(some, act, worlds), strict=True)
 
     def vacuity(self, rng: np.random.Generator) -> Vacuity:
         """Find the best policy of constant or random actions.
@@ -94,11 +94,17 @@ class SkillTrials:
                 best = Vacuity(success, name, rounds * len(self._initiations))
         return best
 
-    def _run(self, numbers: Sequence[int], act: Act) -> list[bool]:
-        """Run trials over the same objects side by side, each until it succeeds."""
+    def _run(self, numbers: Sequence[int], act: Act, known: list[World]) -> list[bool]:
+        """Run trials over the same objects side by side, each until it succeeds.
+
+        Args:
+            numbers: Numbers of the trials.
+            act: Policy that acts in them.
+            known: Worlds of earlier trials over these objects; new ones are added.
+        """
         begun = [self._initiations[i] for i in numbers]
         which = np.array([self._mdp.groundings.number(one.grounding) for one in begun])
-        worlds = self._worlds_in([one.state for one in begun])
+        worlds = self._worlds_in([one.state for one in begun], known)
         states = np.stack([world.state.data for world in worlds])
         rows = first = self._mdp.groundings.rows(states.copy())
         going = np.arange(len(begun))
@@ -114,13 +120,17 @@ class SkillTrials:
                 break
         return [i not in going for i in range(len(begun))]
 
-    def _worlds_in(self, states: Sequence[State]) -> list[World]:
-        """Worlds of the same objects, one in each state; those of earlier trials, reset."""
-        worlds = self._worlds.setdefault(states[0].layout, [])
-        for world, state in zip(worlds, states, strict=False):
+    def _worlds_in(self, states: Sequence[State], known: list[World]) -> list[World]:
+        """Worlds in states over the same objects: known ones, reset, and new ones, which are added.
+
+        Args:
+            states: States of the worlds.
+            known: Worlds over these objects.
+        """
+        for world, state in zip(known, states, strict=False):
             world.reset(state)
-        worlds += [self._domain.make_world(state) for state in states[len(worlds) :]]
-        return worlds[: len(states)]
+        known += [self._domain.make_world(state) for state in states[len(known) :]]
+        return known[: len(states)]
 
 
 def blind_policies(actions: int, rng: np.random.Generator) -> Mapping[str, Act]:

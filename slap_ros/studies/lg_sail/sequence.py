@@ -10,9 +10,9 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
 
-from slap_ros.api.acquisition_sequence import SequenceStep
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs
 from slap_ros.api.left_out import Tell
+from slap_ros.api.sequence_step import SequenceStep
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.summary import Spread
@@ -38,13 +38,16 @@ default): the product of the success of the plan's skills, from states that plan
 rounds of training, and at the end, whole plans are carried out instead. *All steps* go on until
 enough tasks are solved three judgements in a row (the setting `solved`, .8 by default), the last of
 whole plans, until nothing fails, or until the budget is spent. Steps are of all skills together,
-the mean ± sample standard deviation over sequences; a cell has a ≥ where a sequence never came to
-.8 at a goal, and its whole length counts. A sequence that has not come to its last goal counts as
-far as it came. *Solved* is the share of tasks, which training never sees, whose stages were all
-done right after the goal was learned. For all goals before, it is given as it is now, and as it was
-right after each of these was learned. Judgements and trials are not counted as steps."""
+the mean ± sample standard deviation over sequences, where there are several; a cell has a ≥ where a
+sequence never came to .8 at a goal, and its whole length counts. A sequence that has not come to
+its last goal counts as far as it came. *Solved* is the share of tasks, which training never sees,
+whose stages were all done right after the goal was learned. For all goals before, it is given as it
+is now, and as it was right after each of these was learned. Earlier goals that are not done any
+more after a goal may be learned again, once each (`--relearn`). The steps of that are counted with
+this goal's, up to .8 and in all, and success is then as it is after that. Judgements and trials are
+not counted as steps."""
 SEQUENCES = "runs/sequences"
-CARRIED, SCRATCH = "carried on", "from scratch"
+CARRIED, RELEARNED, SCRATCH = "carried on", "carried on, relearned", "from scratch"
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,10 @@ class GoalOfSequence:
 
     Args:
         goal: Name of the goal, or its atoms.
-        level_steps: Environment steps of each sequence until enough of its tasks were solved.
+        level_steps: Environment steps of each sequence until enough of its tasks were solved, and
+            for earlier goals that were learned again after it.
         reached: Number of sequences that came there.
-        steps: Environment steps that each sequence learned for it.
+        steps: Environment steps that each sequence learned for it and for these.
         solved: Share of its tasks that were solved right after it was learned, of each sequence.
         kept: Mean of that over all goals before it, of each sequence; empty for the first.
         before: Mean of what that was right after each of these goals was learned.
@@ -87,9 +91,9 @@ def goals_of(sequences: Sequence[Sequence[SequenceStep]]) -> list[GoalOfSequence
         found.append(
             GoalOfSequence(
                 own[0].goal,
-                tuple(one.steps_to_level for one in own),
+                tuple(one.steps_to_level + sum(one.again.values()) for one in own),
                 sum(one.reached for one in own),
-                tuple(one.steps for one in own),
+                tuple(one.steps + sum(one.again.values()) for one in own),
                 tuple(one.solved[one.goal] for one in own),
                 tuple(kept),
                 tuple(before),
@@ -117,7 +121,8 @@ def study(domain: str, kinds: Mapping[str, Sequence[Sequence[SequenceStep]]]) ->
 
     Args:
         domain: Name of the domain.
-        kinds: Sequences that carry a library on, and those from scratch; all have the same goals.
+        kinds: Sequences that carry a library on, those in which earlier goals are learned again,
+            and those from scratch; all have the same goals.
 
     Returns:
         The report.
@@ -159,16 +164,19 @@ def _row(kind: str, goal: GoalOfSequence) -> list[str]:
         kind,
         goal.goal,
         str(len(goal.steps)),
-        ("" if goal.reached == len(goal.steps) else "≥ ") + _spread(goal.level_steps),
-        _spread(goal.steps),
-        format_spread(Spread.of(goal.solved), 2),
-        format_spread(Spread.of(goal.kept), 2) if goal.kept else "-",
-        format_spread(Spread.of(goal.before), 2) if goal.before else "-",
+        ("" if goal.reached == len(goal.steps) else "≥ ") + _spread(goal.level_steps, 0),
+        _spread(goal.steps, 0),
+        _spread(goal.solved, 2),
+        _spread(goal.kept, 2),
+        _spread(goal.before, 2),
     ]
 
 
-def _spread(steps: Sequence[int]) -> str:
-    return format_spread(Spread.of([float(count) for count in steps]), 0)
+def _spread(values: Sequence[float], digits: int) -> str:
+    """Mean ± sample standard deviation; one value as it is, and a dash where there are none."""
+    if len(values) == 1:
+        return f"{values[0]:.{digits}f}"
+    return format_spread(Spread.of(values) if values else None, digits)
 
 
 def draw(figure: Figure, kinds: Mapping[str, Sequence[GoalOfSequence]]) -> None:
@@ -189,11 +197,19 @@ def _summary(found: Data) -> str:
     shares, kept = found["later_over_first"], found["kept_over_before"]
     said = [
         f"{kind}: {share:.2f} of the first goal's steps for each later one"
-        + (f", {kept[kind]:.2f} of the success kept" if kind == CARRIED and kept[kind] else "")
+        + (f", {kept[kind]:.2f} of the success kept" if kind != SCRATCH and kept[kind] else "")
+        + _missed(found["sequences"][kind])
         for kind, share in shares.items()
         if share is not None
     ]
     return "; ".join(said) or "nothing was learned for the first goal"
+
+
+def _missed(sequences: Sequence[Sequence[Data]]) -> str:
+    """The goals at which a sequence never came to .8, whose steps are too few for that."""
+    steps = [step for sequence in sequences for step in sequence if not step["reached"]]
+    missed = sorted({step["goal"] for step in steps})
+    return f", never .8 of {', '.join(missed)}" if missed else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,7 +237,7 @@ def prepare(options: SequenceStudyOptions, tell: Tell) -> PreparedStudy:
     """
     domain = get_domain(options.domain)
     folders = options.library or _in_runs(domain.name)
-    kinds: dict[str, list[tuple[SequenceStep, ...]]] = {CARRIED: [], SCRATCH: []}
+    kinds: dict[str, list[tuple[SequenceStep, ...]]] = {CARRIED: [], RELEARNED: [], SCRATCH: []}
     for folder in folders:
         try:
             kind, steps = read_sequence(folder, domain.name)
@@ -270,7 +286,8 @@ def read_sequence(folder: Path, domain: str) -> tuple[str, tuple[SequenceStep, .
                 raise ValueError(f"after {step.goal}, not all goals were tried")
         if not steps:
             raise ValueError("it has no goals")
-        return SCRATCH if sequence["scratch"] else CARRIED, steps
+        again = RELEARNED if sequence.get("relearn") else CARRIED
+        return SCRATCH if sequence["scratch"] else again, steps
     except DECODING_ERRORS as error:
         raise InvalidLibraryError(
             f"{folder}: no sequence made it, or it is damaged ({error!r}); `slap "
