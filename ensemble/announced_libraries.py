@@ -16,6 +16,7 @@ from slap_msgs.msg import SkillLibrary
 
 from slap_ros.errors import InvalidLibraryError
 
+SHORTCUTS = "shortcuts"  # folder beside the skills in the results of `slap grow`
 KEPT = 32  # folders: those that were announced last
 
 
@@ -66,12 +67,32 @@ class AnnouncedLibraries:
         newest = [key for key in reversed(self._digests) if key[0] == domain]
         return [folder for _, folder in sorted(newest, key=lambda k: self._digests[k] != digest)]
 
+    def shortcuts(self, domain: str, digest: str) -> Path | None:
+        """The folder of what ``slap grow`` left beside the skills that were announced last.
+
+        Args:
+            domain: Name of the domain.
+            digest: Digest of the skills.
+
+        Returns:
+            The folder; None where these skills were not announced, or nothing is beside them.
+        """
+        announced = (key for key in reversed(self._digests) if self._digests[key] == digest)
+        folders = (at.parent / SHORTCUTS for name, at in announced if name == domain)
+        for beside in map(Path.resolve, folders):
+            if self._may_open(beside) and beside.is_dir():
+                return beside
+        return None
+
+    def _may_open(self, folder: Path) -> bool:
+        return any(folder.is_relative_to(root) for root in self._allowed)
+
     def _permitted(self, name: str) -> Path:
         try:
             folder = Path(name).resolve()
         except (OSError, ValueError) as error:  # such as a zero byte
             raise InvalidLibraryError(f"{name!r} is no path: {error}") from error
-        if not any(folder.is_relative_to(root) for root in self._allowed):
+        if not self._may_open(folder):
             below = os.pathsep.join(map(str, self._allowed)) or "none"
             raise InvalidLibraryError(
                 f"{folder}: announced libraries are opened below {below} only; parameter libraries "

@@ -272,7 +272,7 @@ class EpisodeTracker(Generic[T]):
             return
         try:
             episode, prepared = await run_in_executor(
-                self._workers, lambda: self._made(message, domain)
+                self._workers, lambda: self._made(message, choice, domain)
             )
         except Exception as raised:  # of a domain's code
             self._drop(message)
@@ -333,11 +333,15 @@ class EpisodeTracker(Generic[T]):
                 raise
             return found
 
-    def _made(self, message: TaskMessage, domain: Domain) -> tuple[Episode, T]:
+    def _made(
+        self, message: TaskMessage, announced: DomainChoice, domain: Domain
+    ) -> tuple[Episode, T]:
         initial = decode_state(message.initial_state, domain.types_by_name)
         space = domain.atom_space(initial)
         task = Task(initial, decode_goal(message.goal, space), message.step_limit)
-        episode = Episode(message.episode, stamp_ns(message.header), domain, task, space)
+        grown = self._libraries.shortcuts(announced.name, announced.digest)
+        stamp = stamp_ns(message.header)
+        episode = Episode(message.episode, stamp, domain, task, space, grown)
         return episode, self._prepare(episode)
 
     def _refuse(self, kind: str, error: SlapError) -> None:

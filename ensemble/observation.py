@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from slap_ros.core import Domain, Task
 from slap_ros.errors import EpisodeChangedError
@@ -24,6 +25,7 @@ class Episode:
         domain: What the world runs.
         task: Initial state, goal and step limit.
         space: Every ground atom over the task's objects.
+        grown: Folder of the shortcuts beside the announced skills; None where there is none.
     """
 
     number: int
@@ -31,6 +33,7 @@ class Episode:
     domain: Domain
     task: Task
     space: AtomSpace
+    grown: Path | None = None
 
     def may_have(self, message: StateMessage | AtomsMessage) -> bool:
         """Whether a state, or its atoms, may be of this episode: number, and at first the stamp.

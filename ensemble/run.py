@@ -19,7 +19,7 @@ from ensemble.launcher import InProcessLauncher, NodeLauncher, NodeParameters, P
 from ensemble.node_process import ForkServer
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.patience import load_advice
-from ensemble.skill_request import LACKING, SkillRequest, SkillRequester
+from ensemble.skill_request import SkillRequest, SkillRequester
 from ensemble.spinner import Spinner, temporary_node
 from slap_ros.errors import (
     AlreadyRunningError,
@@ -53,7 +53,7 @@ class RunRequest:
     import_s: float = 0.0  # s that importing the domain took, which every node does as well
     in_process: bool = False
     shown: Collection[Topic] = ()  # to be followed as well, for the eye
-    skills: SkillRequest | None = None  # to be acquired where the run lacks some; None: it fails
+    skills: SkillRequest | None = None  # what is learned where the run lacks it; None: it fails
 
 
 def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
@@ -135,7 +135,7 @@ def _drive(
 def _solve_with_skills(
     request: RunRequest, client: RunClient, spinner: Spinner, requester: SkillRequester
 ) -> None:
-    """Solve the task; where skills are lacking, have them acquired first, and try it once more.
+    """Solve the task; where skills or shortcuts are lacking, have them learned, and try it again.
 
     Args:
         request: What to run.
@@ -154,12 +154,12 @@ def _solve_with_skills(
         failure = error
     runs = client.log.runs()
     code = failure.code if failure is not None else runs[-1].error_code if runs else ErrorCode.NONE
-    if request.skills is None or code not in LACKING:
+    if request.skills is None or not request.skills.answers(code):
         if failure is not None:
             raise failure
         return
-    acquired = requester.acquire(request.skills, request.goal, end - monotonic())
-    _solve(request, client, spinner, end, requester.begin_again(acquired.digest))
+    learned = requester.learn(request.skills, request.goal, end - monotonic())
+    _solve(request, client, spinner, end, requester.begin_again(learned.digest))
 
 
 def _solve(

@@ -18,6 +18,7 @@ from slap_ros.relational import Layout, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import (
+    NONE,
     chosen_library,
     remark_on_skills,
     require_usable,
@@ -26,12 +27,16 @@ from slap_ros.shortcuts.shipped import (
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
+GROWN = "grown"  # the choice of what lies beside the skills that slap/skills announces
+
 
 @dataclass(frozen=True)
 class ShortcutParameters:
     """What planner and skill server must be given alike."""
 
-    shortcuts: str = parameter("", "folder of a shortcut library, or none; empty: the shipped one")
+    shortcuts: str = parameter(
+        "", "folder of a shortcut library, or none, or grown; empty: the shipped one"
+    )
     samples: int = parameter(DEFAULT.samples, "attempts of a shortcut in the model when planning")
 
 
@@ -57,9 +62,11 @@ class ShortcutProvider:
             raise InvalidParameterError(
                 f"parameter samples must be at least 1, not {settings.samples}"
             )
-        require_usable(settings.shortcuts, planner)
+        self._follows = settings.shortcuts == GROWN
+        self._choice = NONE if self._follows else settings.shortcuts
+        require_usable(self._choice, planner)
         self.sampling = replace(DEFAULT, samples=settings.samples)
-        self._node, self._choice, self._planner = node, settings.shortcuts, planner
+        self._node, self._planner = node, planner
         self._libraries: dict[tuple[str, str], ShortcutLibrary | None] = {}  # by _key
         self._made: dict[Layout, GroundedShortcuts] = {}  # of one episode
         self._made_for: Episode | None = None
@@ -71,6 +78,9 @@ class ShortcutProvider:
             InvalidLibraryError: See :meth:`prepare`.
             SkillsChangedError: The shortcuts were learned over other skills.
         """
+        if self._follows:
+            self._choice = str(episode.grown or NONE)
+            self._libraries.pop(_key(episode.domain), None)
         self._load(episode.domain)
 
     def prepare(self, domain: Domain | None) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run that lacks skills: has them acquired, and the same task set again with them."""
+"""A run that lacks skills, or shortcuts: has them learned, and the same task set again."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Any
 
 from rclpy.action import ActionClient
 from rclpy.task import Future
-from slap_msgs.action import AcquireSkills
+from slap_msgs.action import AcquireSkills, GrowSkills
 from slap_msgs.msg import DomainInfo, Task
 
 from ensemble import encode
 from ensemble.client import RunClient
-from ensemble.interfaces import ACQUIRE_SKILLS, RESET_TASK, Call
+from ensemble.interfaces import ACQUIRE_SKILLS, GROW_SKILLS, RESET_TASK, Call
 from ensemble.patience import load_advice
 from ensemble.spinner import Spinner
 from slap_ros.errors import ErrorCode, NotReadyError, RunTimeoutError, error_from
@@ -40,17 +40,27 @@ LACKING = frozenset(
 
 @dataclass(frozen=True)
 class SkillRequest:
-    """Which skills to acquire where a run lacks some.
+    """What is to be learned where a run lacks it.
 
     Args:
         proposer: Name of the proposer of operators.
         rewarder: Name of the proposer of rewards.
         seed: Seed of all random numbers of the training.
+        training: Action that is asked for: skills, or skills and shortcuts over them.
     """
 
     proposer: str
     rewarder: str
     seed: int = 0
+    training: Call = ACQUIRE_SKILLS
+
+    def answers(self, code: ErrorCode) -> bool:
+        """Whether what is learned may change how a run ended.
+
+        Args:
+            code: Error code of the run. A task that is solved may have a shorter plan.
+        """
+        return code in LACKING or (self.training is GROW_SKILLS and code == ErrorCode.NONE)
 
 
 class SkillRequester:
@@ -65,53 +75,60 @@ class SkillRequester:
             patience: Factor of all deadlines.
         """
         self._client, self._spinner, self._patience = client, spinner, patience
-        self._acquire = ActionClient(client, ACQUIRE_SKILLS.type, ACQUIRE_SKILLS.name)
+        self._trainings = {
+            call.name: ActionClient(client, call.type, call.name)
+            for call in (ACQUIRE_SKILLS, GROW_SKILLS)
+        }
         self._reset = client.create_client(RESET_TASK.type, RESET_TASK.name)
 
     def destroy(self) -> None:
-        """Destroy the action's client."""
-        self._acquire.destroy()
+        """Destroy the actions' clients."""
+        for client in self._trainings.values():
+            client.destroy()
 
     def ready(self) -> bool:
-        """Whether both can be asked."""
-        return self._acquire.server_is_ready() and self._reset.service_is_ready()
+        """Whether all can be asked."""
+        trainings = all(client.server_is_ready() for client in self._trainings.values())
+        return trainings and self._reset.service_is_ready()
 
-    def acquire(
+    def learn(
         self, request: SkillRequest, goal: Collection[GroundAtom], timeout_s: float
-    ) -> AcquireSkills.Result:
-        """Have the skills acquired that a goal takes.
+    ) -> AcquireSkills.Result | GrowSkills.Result:
+        """Have the skills acquired that a goal takes, and shortcuts learned if they are asked for.
 
         Args:
-            request: Names of the proposers of operators and rewards, and the seed.
+            request: Action, names of the proposers of operators and rewards, and the seed.
             goal: Atoms to reach; empty for the task's own.
             timeout_s: For how long to wait, s.
 
         Returns:
-            What was acquired.
+            What was learned.
 
         Raises:
             RunTimeoutError: They are not there in time.
             SlapError: Why there are none.
         """
         end = monotonic() + timeout_s
-        asked = AcquireSkills.Goal(
+        training = request.training
+        asked = training.type.Goal(
             goal=encode.goal(goal),
             proposer=request.proposer,
             rewarder=request.rewarder,
             seed=request.seed,
         )
-        sent = self._acquire.send_goal_async(asked)
+        sent = self._trainings[training.name].send_goal_async(asked)
         try:
-            self._wait(sent, end, ACQUIRE_SKILLS)
+            self._wait(sent, end, training)
             ended = sent.result().get_result_async()
-            self._wait(ended, end, ACQUIRE_SKILLS)
+            self._wait(ended, end, training)
         except (KeyboardInterrupt, RunTimeoutError):
             self._cancel(sent)
             raise
         result = ended.result().result
         if not result.success:
             raise error_from(result.error_code, f"no skills were acquired: {result.error_msg}")
-        return result
+        learned: AcquireSkills.Result | GrowSkills.Result = result
+        return learned
 
     def begin_again(self, digest: str) -> int:
         """Set the newest task again, in a world that has taken the library on.

@@ -74,7 +74,7 @@ PARAMETERS = {
     "index": (int, "which of the seed's tasks"),
     "goal": (str, "goal of the task, by name or as atoms"),
     "planner": (str, "planner: anytime, lazy, exhaustive, ff or astar"),
-    "shortcuts": (str, "folder of a shortcut library, or none"),
+    "shortcuts": (str, "folder of a shortcut library, none, or grown"),
     "samples": (int, "attempts of a shortcut in the model; the shortest is used"),
     "scene": (str, "scene file of a robot"),
     "arm": (str, "arm of a robot: panda or fr3"),

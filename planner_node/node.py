@@ -5,7 +5,8 @@
 ROS Parameters:
     planner (string, "anytime"): anytime, lazy, exhaustive, ff or astar; anytime may have settings,
         as in anytime:within=1.25,effort=4; see ``slap_ros.planning.planner_choice``.
-    shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
+    shortcuts (string, ""): folder of a shortcut library; or none; or grown, for what
+        slap/grow_skills leaves beside the skills of slap/skills; empty: the shipped one.
     samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     observation_timeout (double, 10.0): seconds to wait for a perceived state.
     server_timeout (double, 5.0): seconds without a skill server after which a run fails.

@@ -3,7 +3,8 @@
 """Executes options and shortcuts: one command per perceived state.
 
 ROS Parameters:
-    shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
+    shortcuts (string, ""): folder of a shortcut library; or none; or grown, for what
+        slap/grow_skills leaves beside the skills of slap/skills; empty: the shipped one.
     samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     state_timeout (double, 2.0): seconds without a new state after which a skill is given up.
     hold_steps (int, 0): environment steps for which a skill holds at its end until its target is

@@ -42,6 +42,9 @@ class EventPrinter:
                 f"{message.subject}: success {message.success[0]:.2f}, "
                 f"{message.success[-1]:.2f} after {steps} steps"
             )
+        elif message.kind == AcquisitionEventKind.VALIDATED:
+            without, *with_it = (f"{length:.1f} steps" for length in message.lengths)
+            console.print(f"{message.subject}: {without} → {''.join(with_it) or 'no plan'}")
         elif message.kind == AcquisitionEventKind.ACQUIRED:
             console.print(
                 f"skills acquired: library {message.digest}, task progress {message.progress:.2f}"

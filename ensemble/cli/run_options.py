@@ -165,11 +165,25 @@ class RunOptions:
             "task with them. --timeout must leave time for this.",
         ),
     ] = False
+    grow: Annotated[
+        bool,
+        typer.Option(
+            "--grow",
+            help="Solve the task, acquire skills and learn shortcuts over them as `slap grow` "
+            "does, and solve the task again with both. --timeout must leave time for this.",
+        ),
+    ] = False
     proposer: Annotated[
-        str, typer.Option(help="With --acquire: source of operators: manual, induced or language.")
+        str,
+        typer.Option(
+            help="With --acquire or --grow: source of operators: manual, induced or language."
+        ),
     ] = MANUAL
     rewarder: Annotated[
-        str, typer.Option(help="With --acquire: source of rewards: manual, composed or language.")
+        str,
+        typer.Option(
+            help="With --acquire or --grow: source of rewards: manual, composed or language."
+        ),
     ] = MANUAL
     acquisition: Annotated[
         str, typer.Option(help="Parameters of acquisition_node, such as steps=20000,jobs=2.")
@@ -224,8 +238,19 @@ class RunOptions:
         require_known("--proposer", self.proposer, PROPOSERS)
         require_known("--rewarder", self.rewarder, REWARDERS)
         said = self.acquisition or (self.proposer, self.rewarder) != (MANUAL, MANUAL)
-        if said and not self.acquire:
-            raise InvalidParameterError("--acquisition, --proposer and --rewarder: for --acquire")
+        if said and not self.learns:
+            raise InvalidParameterError(
+                "--acquisition, --proposer and --rewarder are for --acquire and --grow"
+            )
+        if self.grow and (self.acquire or self.shortcuts):
+            raise InvalidParameterError(
+                "--grow acquires skills and learns shortcuts: leave out --acquire and --shortcuts"
+            )
+
+    @property
+    def learns(self) -> bool:
+        """Whether the acquisition node is to run."""
+        return self.acquire or self.grow
 
     @property
     def task_seed(self) -> int:

@@ -17,7 +17,7 @@ from ensemble.cli.live import Dashboard
 from ensemble.cli.run_options import RunOptions
 from ensemble.client import OnMessage
 from ensemble.foxglove_server import SHOWN_TOPICS, FoxgloveServer, foxglove_installed
-from ensemble.interfaces import ACQUISITION_EVENTS
+from ensemble.interfaces import ACQUIRE_SKILLS, ACQUISITION_EVENTS, GROW_SKILLS
 from ensemble.nodes import RunSettings
 from ensemble.parameters import parse_parameters
 from ensemble.patience import grown_patience
@@ -31,6 +31,7 @@ from ensemble.robot_parameters import (
 )
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
+from ensemble.shortcuts import GROWN
 from ensemble.skill_request import SkillRequest
 from slap_ros.api.video import require_renderable
 from slap_ros.cli.console import console, print_json, styled
@@ -133,7 +134,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         goal=options.goal or "",
         pace=options.pace,
         patience=options.patience or grown_patience(import_s),
-        shortcuts=options.shortcuts or "",
+        shortcuts=GROWN if options.grow else options.shortcuts or "",
         samples=options.samples,
         world=options.world,
         scene=str(options.scene or bridge.get("scene", "")),
@@ -151,9 +152,17 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         timeout_s=options.timeout,
         import_s=import_s,
         in_process=options.in_process,
-        skills=SkillRequest(options.proposer, options.rewarder) if options.acquire else None,
-        shown=(ACQUISITION_EVENTS,) if options.acquire else (),
+        skills=_skill_request(options),
+        shown=(ACQUISITION_EVENTS,) if options.learns else (),
     )
+
+
+def _skill_request(options: RunOptions) -> SkillRequest | None:
+    """What is to be learned; None for nothing."""
+    if not options.learns:
+        return None
+    training = GROW_SKILLS if options.grow else ACQUIRE_SKILLS
+    return SkillRequest(options.proposer, options.rewarder, training=training)
 
 
 def _robot(options: RunOptions) -> tuple[Parameters, Parameters]:
@@ -202,7 +211,7 @@ def _require_camera(options: RunOptions, domain: Domain) -> None:
 
 def _acquisition(options: RunOptions) -> dict[str, str | int | float] | None:
     """The parameters of the acquisition node; None where it is not to run."""
-    if not options.acquire:
+    if not options.learns:
         return None
     # What talks to models and learns takes a fifth of this command's imports.
     from ensemble.acquisition_parameters import AcquisitionParameters
@@ -216,7 +225,7 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
     Raises:
         SlapError: It is no goal of the task; or planner, library or pictures are not there.
     """
-    with suppress(*(NoSkillsError,) if options.acquire else ()):
+    with suppress(*(NoSkillsError,) if options.learns else ()):
         make_planner(options.planner_choice, domain, task.initial_state)
     chosen_library(options.shortcuts, domain, options.planner_choice)
     if options.render is not None:

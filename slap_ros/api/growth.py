@@ -17,9 +17,11 @@ from slap_ros.api.proposers import Proposers
 from slap_ros.api.training import chosen_settings
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.shortcuts.exploration_steps import usual_steps
 from slap_ros.shortcuts.settings import NEAR, TrainingSettings
 
 STEPS = 1_000_000
+USUAL_SHARE = 0.5  # of the steps of a learned skill until it has failed, that it usually takes
 
 
 @dataclass(frozen=True)
@@ -140,8 +142,8 @@ class GrowthRequest:
             training = self.training
             raise InvalidParameterError(
                 f"{self.steps} environment steps are too few for a round: skills take at least "
-                f"{self.least_skill_steps}, random rollouts of exploration take "
-                f"{training.exploration.usual_steps}, and a shortcut takes {training.most_steps}; "
+                f"{self.least_skill_steps}, rollouts of exploration usually take "
+                f"{self.exploration_steps}, and a shortcut takes {training.most_steps}; "
                 f"give --steps {self.least_steps} or more"
             )
 
@@ -164,8 +166,13 @@ class GrowthRequest:
     @property
     def least_shortcut_steps(self) -> int:
         """Environment steps until a shortcut is learned, exploration included."""
-        training = self.training
-        return training.exploration.usual_steps + training.most_steps
+        return self.exploration_steps + self.training.most_steps
+
+    @property
+    def exploration_steps(self) -> int:
+        """Environment steps that are kept for exploration, which may take no more if need be."""
+        skill_steps = round(USUAL_SHARE * horizon_of(self.domain))
+        return usual_steps(self.domain, self.training.exploration, skill_steps)
 
     def most_skill_steps(self, left: int) -> int:
         """Environment steps that skills may take in a round, which leave some for a shortcut.
@@ -179,12 +186,17 @@ class GrowthRequest:
     def affordable_changes(self, left: int) -> list[str]:
         """The changes of settings of shortcuts, so that no more are learned than can be paid.
 
+        And no more is explored than leaves enough for a shortcut.
+
         Args:
             left: Environment steps that are left.
         """
-        given, left = self.training.budget, max(left, 1)  # 0 would be no limit
-        others = [text for text in self.shortcut_changes if not text.startswith("budget=")]
-        return [*others, f"budget={min(left, given) if given else left}"]
+        training, budgets = self.training, ("budget=", "exploration.budget=")
+        most = _no_more(left, training.budget)
+        exploration = training.exploration
+        each = _no_more((most - training.most_steps) // exploration.tasks, exploration.budget)
+        others = [text for text in self.shortcut_changes if not text.startswith(budgets)]
+        return [*others, f"budget={most}", f"exploration.budget={each}"]
 
     def round_folder(self, number: int) -> Path:
         """The folder of a round.
@@ -265,6 +277,16 @@ class GrowthRequest:
         if not any(one.kept for one in last.tried):
             return "no shortcut makes plans shorter"
         return ""
+
+
+def _no_more(left: int, given: int) -> int:
+    """A budget of what is left, or what was given if that is less; 0 would be no limit.
+
+    Args:
+        left: Environment steps that are left.
+        given: Environment steps that were given; 0 for no limit.
+    """
+    return max(1, min(left, given) if given else left)
 
 
 def _named(folder: Path) -> str:

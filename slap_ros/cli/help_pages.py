@@ -27,6 +27,7 @@ PANELS: Mapping[str, str] = {
         (
             "skills",
             "acquire",
+            "grow",
             "acquisition",
             "proposer",
             "rewarder",

@@ -24,6 +24,7 @@ TABLES_IN = (
     "docs/presets.md",
     "docs/reproducing.md",
     "docs/results/README.md",
+    "docs/results/growth_stack_at_target.md",
     "docs/skills.md",
 )
 PAGES = [Path(page) for page in TABLES_IN]  # with tables made of results

@@ -7,10 +7,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import fmean, stdev
 
 import numpy as np
 
 NORMAL_95 = 1.959963984540054  # within so many standard deviations are 95 % of a normal variable
+STUDENT_95 = (12.706, 4.303, 3.182, 2.776)  # the same of Student's t, 1 to 4 degrees of freedom
 RESAMPLES = 10_000
 SEED = 95  # seed of the resampling: the same trials give the same interval
 
@@ -68,6 +70,21 @@ def wilson_interval(successes: int, trials: int) -> Interval:
     low = 0.0 if successes == 0 else middle - half
     high = 1.0 if successes == trials else middle + half
     return Interval(low, high)
+
+
+def mean_interval(values: Sequence[float]) -> Interval | None:
+    """Student's 95 % interval of the mean of few values, such as those of several seeds.
+
+    Args:
+        values: Values, at most one more than :data:`STUDENT_95` knows.
+
+    Returns:
+        The interval; None with fewer than two values.
+    """
+    if len(values) < 2:
+        return None
+    half = STUDENT_95[len(values) - 2] * stdev(values) / math.sqrt(len(values))
+    return Interval(fmean(values) - half, fmean(values) + half)
 
 
 def ratio_interval(numerators: Sequence[float], denominators: Sequence[float]) -> Interval | None:

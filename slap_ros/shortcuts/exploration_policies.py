@@ -93,6 +93,21 @@ class StraightPushes:
         return self.directions
 
 
+def within_reach(domain: Domain, state: State) -> list[Object]:
+    """The objects that there is a point in going to, which are those that pushes go to.
+
+    Args:
+        domain: Domain of the state.
+        state: State in which the pushes would begin.
+    """
+    interface, batch = learner_interface(domain), state.alone()
+    hand = interface.hand(batch)
+    distances = {
+        obj: interface.distance(batch, hand, Column((obj,)))[0, 0] for obj in state.layout.objects
+    }
+    return [obj for obj, distance in distances.items() if np.isfinite(distance)]
+
+
 class PushAim:
     """Finds the directions of pushes, by trying every axis in the model."""
 
@@ -107,12 +122,8 @@ class PushAim:
             count: Number of the worlds.
             rng: Generator that draws how much pushes are tilted.
         """
-        self._interface, self._worlds, self._count, self._rng = (
-            learner_interface(domain),
-            worlds,
-            count,
-            rng,
-        )
+        self._domain, self._interface = domain, learner_interface(domain)
+        self._worlds, self._count, self._rng = worlds, count, rng
         self._to_action = ActionMap(domain, gripper=False)
         self.steps = 0  # environment steps so far
 
@@ -124,7 +135,7 @@ class PushAim:
         Args:
             state: State in which the pushes begin.
         """
-        objects = self._within_reach(state)
+        objects = within_reach(self._domain, state)
         gradients = self._gradients(state, objects)
         for gradient in gradients.T:
             steepest = float(np.abs(gradient).max())
@@ -138,14 +149,6 @@ class PushAim:
         tilted = direction + noise
         fastest: Array = np.abs(tilted).max(axis=-1, keepdims=True)
         return tilted / fastest
-
-    def _within_reach(self, state: State) -> list[Object]:
-        return [obj for obj in state.layout.objects if np.isfinite(self._distance(state, obj))]
-
-    def _distance(self, state: State, obj: Object) -> float:
-        batch = state.alone()
-        hand = self._interface.hand(batch)
-        return float(self._interface.distance(batch, hand, Column((obj,)))[0, 0])
 
     def _gradients(self, state: State, objects: list[Object]) -> Array:
         """How distances grow with each axis, shape (axes, objects)."""

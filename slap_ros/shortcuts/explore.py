@@ -35,6 +35,7 @@ from slap_ros.shortcuts.exploration_policies import (
     PushAim,
     RandomExploration,
 )
+from slap_ros.shortcuts.exploration_steps import exploration_worlds, most_rollout_steps
 from slap_ros.shortcuts.rollout_origins import OptionRetracer, RolloutOrigin
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
@@ -42,7 +43,6 @@ from slap_ros.shortcuts.way_on import WayOn, steps_to_goal
 
 OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
 ABSORBED_MOTION = 0.5  # share of a motion's steps that remain where it is part of a shortcut
-UNBATCHED_WORLDS = 4  # worlds where a domain's cannot be stepped together
 
 
 @dataclass(frozen=True)
@@ -214,8 +214,7 @@ class Explorer:
         )
         nodes = self.graph.nodes
         self._joined = {(nodes[edge.source], nodes[edge.target]) for edge in self.graph.edges}
-        worlds = settings.rollouts if domain.steps_together else UNBATCHED_WORLDS
-        self._count = worlds
+        self._count = worlds = exploration_worlds(domain, settings)
         self._worlds = domain.make_vector_world([task.initial_state] * worlds)
         self._aim = PushAim(domain, self._worlds, worlds, rng)
         self._retracer = OptionRetracer(
@@ -267,6 +266,8 @@ class Explorer:
         to_go = steps_to_goal(self.graph, operator_steps)
         candidates: list[ShortcutCandidate] = []
         for origin in self._origins(vertices):
+            if most_rollout_steps(self._domain, self._settings, origin.state) > self._left:
+                break
             for abstract, reached in self._roll_out(origin).items():
                 if len(reached.lengths) < self._settings.hits:
                     continue
@@ -276,9 +277,20 @@ class Explorer:
         return ExplorationResult(
             tuple(candidate for candidate in candidates if candidate.expected_saving > 0.0),
             len(self.graph.candidates()),
-            self._steps + self._aim.steps + self._retracer.steps + self._way_on.steps,
+            self._taken,
             operator_steps,
         )
+
+    @property
+    def _taken(self) -> int:
+        """Environment steps so far."""
+        return self._steps + self._aim.steps + self._retracer.steps + self._way_on.steps
+
+    @property
+    def _left(self) -> float:
+        """Environment steps that are left of the budget; infinite where there is none."""
+        budget = self._settings.budget
+        return budget - self._taken if budget else float("inf")
 
     def _origins(self, vertices: Sequence[Vertex]) -> Iterator[RolloutOrigin]:
         """Yield where rollouts begin: in vertices, and inside the options that led there.
@@ -288,9 +300,12 @@ class Explorer:
         """
         for vertex in vertices:
             yield RolloutOrigin(vertex, vertex.state)
-            if self._settings.inside and vertex.edge is not None:
+            if self._settings.inside and vertex.edge is not None and vertex.parent is not None:
+                if vertex.g - vertex.parent.g > self._left:
+                    return
                 target = vertex.edge.option.target(self.graph.nodes[vertex.node])
-                for origin in self._retracer.inside(vertex, target, self._settings.inside):
+                # All at once: rollouts may use up what is left, and then no step may follow.
+                for origin in list(self._retracer.inside(vertex, target, self._settings.inside)):
                     before = self.space.abstract(origin.vertex.state)
                     if not (before ^ self.space.abstract(origin.state)) & self._grasping:
                         yield origin
@@ -323,7 +338,7 @@ class Explorer:
             return _Destination(nodes[j], to_go[j], beyond=False) if j > vertex.node else None
         if not self._settings.beyond or target in nodes:
             return None
-        to_go_beyond = self._way_on.measure(reached.shortest, target, operator_steps)
+        to_go_beyond = self._way_on.measure(reached.shortest, target, operator_steps, self._left)
         return _Destination(target, to_go_beyond, beyond=True)
 
     def _index_after(self, vertex: Vertex) -> Mapping[int, int]:

@@ -39,6 +39,8 @@ class ExplorationSettings:
         inside: Environment steps between the states inside a skill's execution in which rollouts
             begin as well; 0 for none.
         beyond: Whether abstract states count that operators reach in no plan.
+        budget: Environment steps of a task; no rollouts are begun that could take more. 0 for no
+            such limit.
     """
 
     tasks: int = 4
@@ -51,25 +53,16 @@ class ExplorationSettings:
     pushes: int = 0
     inside: int = 0
     beyond: bool = False
-
-    @property
-    def usual_steps(self) -> int:
-        """Environment steps of random rollouts from where skills end, in all tasks together.
-
-        Exploration may take fewer, where rollouts fail early, and more, where it does more than
-        that.
-        """
-        batches = 2 if self.also_repeat else 1
-        return self.tasks * self.nodes * batches * self.rollouts * self.length
+    budget: int = 0
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
 
-        What else there is than random rollouts from where skills end is left out where there is
-        none, as work folders have it from when there was no other way.
+        What else there is than random rollouts from where skills end, and a budget, is left out
+        where there is none, as work folders have it from when there was no other way.
         """
         data = stored(self)
-        for name in ("also_repeat", "pushes", "inside", "beyond"):
+        for name in ("also_repeat", "pushes", "inside", "beyond", "budget"):
             if not data[name]:
                 del data[name]
         return data

@@ -37,16 +37,24 @@ class WayOn:
         self._graphs: dict[int, AbstractGraph | None] = {}
         self.steps = 0  # environment steps so far
 
-    def measure(self, state: State, node: int, operator_steps: Mapping[str, float]) -> float:
+    def measure(
+        self,
+        state: State,
+        node: int,
+        operator_steps: Mapping[str, float],
+        budget: float = float("inf"),
+    ) -> float:
         """Execute the way on that looks cheapest.
 
         Args:
             state: State in which the way begins.
             node: Abstract state that stands for the state, a mask; more atoms may hold.
             operator_steps: Mean environment steps of each operator, by name.
+            budget: Environment steps that may be taken; no skill is begun that could take more.
 
         Returns:
-            Environment steps; infinite where there is no way, or a skill on it fails.
+            Environment steps; infinite where there is no way, a skill on it fails, or it could
+            take more than the budget.
         """
         graph = self._graph(node)
         if graph is None:
@@ -55,7 +63,7 @@ class WayOn:
         goals, at, total = set(graph.goal_nodes), 0, 0
         while at not in goals:
             edge = min(forward[at], key=lambda e: _through(e, to_go, operator_steps), default=None)
-            if edge is None:
+            if edge is None or total + edge.option.skill.step_limit > budget:
                 return NO_WAY
             target = edge.option.target(graph.nodes[edge.target])
             rollout = self._problem.model.roll_out(edge.option, state, target)

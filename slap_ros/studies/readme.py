@@ -20,6 +20,7 @@ from slap_ros.files import parse_json, read_text
 from slap_ros.policies.shipped_models import shipped_with_siblings
 from slap_ros.skills.skill_library import read_library_record
 from slap_ros.studies.figures import label
+from slap_ros.studies.growth_table import growth_table
 from slap_ros.studies.reproducing import NOT_MEASURED, other_table, paper_table
 from slap_ros.studies.results import MarkdownTable
 
@@ -286,6 +287,7 @@ TABLES: Mapping[str, Callable[[Path], MarkdownTable]] = {
     "presets": preset_table,
     "skills": skill_table,
     "replanning": replanning_table,
+    "growth": growth_table,
     "papers": paper_table,
     "others": other_table,
 }

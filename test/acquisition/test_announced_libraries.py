@@ -64,6 +64,22 @@ def test_a_folder_is_opened_only_below_those_that_are_allowed(tmp_path):
         AnnouncedLibraries("").add(announced(inside))
 
 
+def test_shortcuts_are_those_beside_the_skills_that_were_announced_last(tmp_path):
+    """A link out of what is allowed is not followed, nor is what lies beside the allowed folder."""
+    allowed, outside = write_library(tmp_path / "allowed"), tmp_path / "shortcuts"
+    libraries = AnnouncedLibraries(str(allowed))
+    for folder in (outside, allowed / "shortcuts", allowed / "first/shortcuts", allowed / "away"):
+        folder.mkdir(parents=True)
+    (allowed / "away/shortcuts").symlink_to(outside)
+    libraries.add(announced(allowed, "2" * 16))
+    libraries.add(announced(write_library(allowed / "away/skills"), "2" * 16))
+    assert libraries.shortcuts("points", "2" * 16) is None
+    for place in (allowed, allowed / "first"):
+        libraries.add(announced(write_library(place / "skills"), "1" * 16))
+        assert libraries.shortcuts("points", "1" * 16) == place / "shortcuts"
+    assert libraries.shortcuts("points", "2" * 16) is libraries.shortcuts("moon", "1" * 16) is None
+
+
 def test_what_is_kept_is_bounded_whatever_is_announced(tmp_path):
     libraries = AnnouncedLibraries(str(tmp_path))
     one = write_library(tmp_path / "one")

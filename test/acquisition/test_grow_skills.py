@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Skills and shortcuts that grow over the network: followed, canceled, and gone on with."""
 
+import json
 import subprocess
-from contextlib import contextmanager
+import sys
 from dataclasses import replace
 
 import pytest
 from slap_msgs.msg import AcquisitionEvent
 
-from ensemble.launcher import ProcessLauncher
-from ensemble.nodes import node_parameters
 from slap_ros.bags import evaluate_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
@@ -20,15 +19,7 @@ from slap_ros.report.page import render
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import load_skill_library
-from support.asking import (
-    LIMIT,
-    SETTINGS,
-    asking,
-    begin_again,
-    grow,
-    send_growth,
-    solve,
-)
+from support.asking import GROWTH_LIMIT, LIMIT, SETTINGS, asking, grow, send_growth
 from support.points_training import SMALL
 from support.steady_skills import write_library
 
@@ -93,9 +84,6 @@ def test_skills_and_shortcuts_grow_and_go_on_after_a_goal_was_canceled(network, 
     assert kinds.count(AcquisitionEvent.CANCELED) == kinds.count(AcquisitionEvent.ACQUIRED) == 1
 
 
-ACTING = ("skill_server", "planner_node")
-
-
 @pytest.mark.slow  # starts an ensemble, in which three processes import torch, and acts twice
 @pytest.mark.timeout(600)
 def test_one_bag_has_the_proposal_the_skills_and_the_plan_that_a_shortcut_makes_shorter(
@@ -103,39 +91,30 @@ def test_one_bag_has_the_proposal_the_skills_and_the_plan_that_a_shortcut_makes_
 ):
     """The same task twice: with skills alone, and with what has grown over them meanwhile."""
     bag, skills = tmp_path / "bag", write_library(tmp_path / "steady")
-    parameters = growing(tmp_path, skills)
-    choice = DomainChoice("points", "line", str(skills))
-    settings = replace(SETTINGS, domain=choice, acquisition=parameters, shortcuts="none")
-    names = ("sim_node", "perception_node", "acquisition_node")
-    with asking(bag, names, settings, **parameters) as (asker, spinner, _):
-        with acting(settings):
-            alone = solve(asker, spinner, begin_again(asker, spinner))
-        # Until DDS has missed those that ended, a goal goes to them.
-        assert spinner.spin_until(lambda: not asker.solver.server_is_ready(), LIMIT)
-        grown = grow(asker, spinner)
-        assert alone.success and grown.success, (alone.error_msg, grown.error_msg)
-        with acting(replace(settings, shortcuts=grown.shortcut_library)):
-            shorter = solve(asker, spinner, begin_again(asker, spinner))
-        assert shorter.success, shorter.error_msg
+    given = growing(tmp_path, skills)
+    del given["skills"]  # all nodes have them
+    run = subprocess.run(
+        [
+            sys.executable, "-m", "ensemble.cli", "run", "points", "--preset", "line",
+            "--skills", skills, "--grow", "--patience", "5",
+            "--acquisition", ",".join(f"{name}={value}" for name, value in given.items()),
+            "--record", bag, "--json",
+        ],
+        capture_output=True, text=True, timeout=GROWTH_LIMIT,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
     first, second = evaluate_bag(bag).runs
-    assert first.success and second.success
+    assert first.success and second.success and second.as_json() == json.loads(run.stdout)
     assert second.plan_length < 0.7 * first.plan_length
-    assert (first.shortcut_steps, second.library) == (0, grown.shortcut_digest)
-    assert second.shortcut_steps == second.plan_length
-    page = render([read_report(bag)])
-    assert "proposal 1: accepted" in page and "acquisition 1: skills acquired" in page
-    assert grown.digest in page
+    assert first.shortcut_steps == 0 and second.shortcut_steps == second.plan_length
     (growth,) = read_report(bag).acquisitions
-    assert [one.name for one in growth.shortcuts if one.kept] == list(grown.shortcuts)
-    assert f'<th scope="row"><code>{grown.shortcuts[0]}</code></th>' in page
-
-
-@contextmanager
-def acting(settings):
-    """The nodes that plan and act, which know some shortcuts from their start on."""
-    every = node_parameters(settings)
-    with ProcessLauncher({name: every[name] for name in ACTING}) as launcher:
-        yield launcher
+    (kept,) = (one for one in growth.shortcuts if one.kept)
+    assert f"{kept.name}: {kept.without:.1f} steps" in run.stderr
+    page, (grown,) = render([read_report(bag)]), (tmp_path / "grown").glob("*/shortcuts")
+    assert "proposal 1: accepted" in page and "acquisition 1: skills acquired" in page
+    assert f'<th scope="row"><code>{kept.name}</code></th>' in page
+    shortcuts = load_library(grown, get_domain("points", "line"))
+    assert (first.library, second.library) == ("", shortcuts.digest)
 
 
 def require_grown(result, folder, choice):

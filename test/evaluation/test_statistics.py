@@ -5,7 +5,12 @@
 import numpy as np
 import pytest
 
-from slap_ros.evaluation.statistics import SuccessRate, ratio_interval, wilson_interval
+from slap_ros.evaluation.statistics import (
+    SuccessRate,
+    mean_interval,
+    ratio_interval,
+    wilson_interval,
+)
 
 
 @pytest.mark.parametrize(
@@ -48,3 +53,10 @@ def test_one_task_says_nothing_about_others():
 
 def test_the_same_trials_give_the_same_interval():
     assert ratio_interval([1, 2, 3], [4, 4, 4]) == ratio_interval([1, 2, 3], [4, 4, 4])
+
+
+def test_the_interval_of_a_mean_of_few_values_is_students():
+    """As scipy.stats.t.interval(0.95, 2, 2.0, 1 / 3 ** 0.5) has it."""
+    interval = mean_interval([1.0, 2.0, 3.0])
+    assert (interval.low, interval.high) == pytest.approx((-0.4841, 4.4841), abs=1e-3)
+    assert mean_interval([1.0]) is None
