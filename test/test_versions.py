@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from slap_ros.versions import revision_of
+from slap_ros.versions import revision_of, versions
 
 
 @pytest.fixture
@@ -37,6 +37,11 @@ def test_a_source_that_was_changed_does(tree):
     clean = revision_of(tree)
     (tree / "source.py").write_text("changed")
     assert revision_of(tree) == f"{clean}-dirty"
+
+
+def test_results_name_the_engine_of_the_simulated_robot():
+    mujoco = pytest.importorskip("mujoco")
+    assert versions()["mujoco"] == mujoco.__version__
 
 
 def test_an_installed_copy_has_none(tmp_path):

@@ -140,6 +140,27 @@ def plot_values(
     axes.plot(places, values, **_pen(approach))
 
 
+def plot_apart(
+    axes: Axes,
+    places: Sequence[float],
+    values: Sequence[float],
+    bars: tuple[Sequence[float], Sequence[float]],
+    approach: str,
+) -> None:
+    """Draw values that are not joined, because their places have no order, each with a bar.
+
+    Args:
+        axes: Axes to draw into.
+        places: Horizontal coordinates of the values.
+        values: Value at each place; what is not a number is not drawn.
+        bars: Length of each bar below and above its value.
+        approach: Name of the approach, which gives colour and marker.
+    """
+    axes.errorbar(
+        places, values, bars, linestyle="none", elinewidth=1, capsize=2.5, **_pen(approach)
+    )
+
+
 def _pen(approach: str) -> dict[str, Any]:
     mark = APPROACH_STYLES[approach]
     return {

@@ -17,6 +17,7 @@ from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import PlanningSetup
+from slap_ros.studies.slap.perturbed import PerturbedOptions, prepare
 from slap_ros.studies.slap.robustness import highest, solve_task
 from slap_ros.studies.slap.table1 import under_presets
 
@@ -85,6 +86,14 @@ def test_the_report_has_our_figures_beside_the_papers(tmp_path):
     page = (tmp_path / "stochastic_obstacle_tower.md").read_text()
     assert "| pure planning (the paper's) |  | 84% |  | 293.6 |  | 1.00 |" in page
     assert "| SLAP (the paper's) |  | 92% |  | 119.7 |  | 0.41 |" in page
+
+
+def test_the_report_says_how_many_steps_each_library_learned_from():
+    options = PerturbedOptions(domain="obstacle_tower", libraries=[LIBRARY], trained=[LIBRARY])
+    settings = prepare(options, pytest.fail).settings
+    learned = json.loads((LIBRARY / "library.json").read_text())["environment_steps"]["learning"]
+    for use in ("libraries", "trained_perturbed"):
+        assert [one["learning_steps"] for one in settings[use]] == [learned]
 
 
 def test_a_domain_without_such_a_preset_is_refused(tmp_path):

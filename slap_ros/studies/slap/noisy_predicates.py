@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from math import nan
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +17,8 @@ from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.evaluation.statistics import SuccessRate
+from slap_ros.evaluation.summary import Spread
 from slap_ros.skills.domain_choice import open_domain
 from slap_ros.studies.comparison import (
     Comparison,
@@ -24,7 +27,7 @@ from slap_ros.studies.comparison import (
     named_tasks,
 )
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
-from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
+from slap_ros.studies.figures import dodged, label, legend_above, plot_apart
 from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.variations import Variation
@@ -32,6 +35,7 @@ from slap_ros.studies.slap.varying_thresholds import VaryingExecutor
 from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Settings of a domain's presets that are thresholds of its predicates, and nothing else.
@@ -261,13 +265,13 @@ def draw(figure: Figure, rows: Sequence[ThresholdRow]) -> None:
     for number, name in enumerate(names):
         own = [one for one in rows if one.approach == name]
         beside = dodged(range(len(own)), number, len(names))
-        plot_values(success, beside, [100.0 * one.figures.solved.share for one in own], name)
+        _plot_shares(success, beside, [one.figures.solved for one in own], name)
         for place, one in zip(beside, own, strict=True):
             if name in one.within.papers:
                 papers = 100.0 * one.within.papers[name]
                 success.plot([place], [papers], "D", color="none", markeredgecolor="black")
-        plot_spreads(length, beside, [one.figures.length for one in own], name)
-        plot_spreads(replans, beside, [one.figures.replans for one in own], name)
+        _plot_means(length, beside, [one.figures.length for one in own], name)
+        _plot_means(replans, beside, [one.figures.replans for one in own], name)
     success.set_ylim(-8, 108)
     success.set_ylabel("success [%];\ndiamonds: the paper's")
     length.set_ylabel("length of solved\ntasks [steps]")
@@ -277,6 +281,25 @@ def draw(figure: Figure, rows: Sequence[ThresholdRow]) -> None:
     replans.set_xticks(range(len(ranges)), ranges)
     replans.set_xlabel("range of the threshold in each step; w: nominal")
     legend_above(figure, length)
+
+
+def _plot_shares(
+    axes: Axes, places: Sequence[float], rates: Sequence[SuccessRate], approach: str
+) -> None:
+    """Draw shares in percent, each with its interval."""
+    shares = [100.0 * one.share for one in rates]
+    below = [100.0 * max(0.0, one.share - one.interval.low) for one in rates]
+    above = [100.0 * max(0.0, one.interval.high - one.share) for one in rates]
+    plot_apart(axes, places, shares, (below, above), approach)
+
+
+def _plot_means(
+    axes: Axes, places: Sequence[float], spreads: Sequence[Spread | None], approach: str
+) -> None:
+    """Draw means, each with a bar of one standard deviation; nothing where there is none."""
+    means = [nan if one is None else one.mean for one in spreads]
+    bars = [nan if one is None else one.sd for one in spreads]
+    plot_apart(axes, places, means, (bars, bars), approach)
 
 
 def summary(found: Data) -> str:

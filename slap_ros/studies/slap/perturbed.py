@@ -10,7 +10,6 @@ from typing import Annotated
 
 from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
-from slap_ros.api.library_descriptions import describe_library
 from slap_ros.domains import get_domain
 from slap_ros.studies.slap import robustness
 from slap_ros.studies.slap.robustness import (
@@ -18,6 +17,7 @@ from slap_ros.studies.slap.robustness import (
     PapersRow,
     RobustnessOptions,
     RobustnessStudy,
+    described,
     renamed_way,
     summary,
 )
@@ -67,13 +67,12 @@ def prepare(options: PerturbedOptions, tell: Tell) -> PreparedStudy:
     trained = [
         one for folder in options.trained or () if (one := open_library(folder, domain, tell))
     ]
-    described = [describe_library(one.name, one.library) for one in trained]
     return robustness.prepare(
         PERTURBED,
         options,
         tell,
         [renamed_way(one, options.samples, TRAINED) for one in trained],
-        {"trained_perturbed": described} if described else {},
+        {"trained_perturbed": described(trained)} if trained else {},
         {"trained": options.trained},
     )
 

@@ -217,14 +217,24 @@ def prepare(
         "samples": options.samples,
         "max_replans": options.max_replans,
     }
-    described = [describe_library(one.name, one.library) for one in trained]
     experiment = Experiment(domain, options.tasks, options.seeds, options.first_seed)
     conditions = made.hides_top, options.max_replans
     return PreparedStudy(
-        {**own, "libraries": described, **(settings or {})},
+        {**own, "libraries": described(trained), **(settings or {})},
         lambda runner: _study(made, experiment, (*ways, *more), conditions, runner),
         {"library": options.libraries, **own, **(given or {})},
     )
+
+
+def described(trained: Sequence[TrainedLibrary]) -> list[dict[str, Any]]:
+    """What the report says of libraries: which they are, and the environment steps of learning."""
+    return [
+        {
+            **describe_library(one.name, one.library),
+            "learning_steps": one.library.record.get("environment_steps", {}).get("learning", 0),
+        }
+        for one in trained
+    ]
 
 
 def _way(trained: TrainedLibrary, approach: Approach) -> PlannedWay:
