@@ -44,8 +44,11 @@ def test_a_state_that_comes_too_late_is_put_down_to_load(network):
     assert_advised(metrics.error_msg)
 
 
-def test_nodes_that_come_up_too_late_are_put_down_to_load(network):
-    processes = replace(impatient(0.01), in_process=False)  # 0.3 s, in which none has imported
+def test_nodes_that_come_up_too_late_are_put_down_to_load(network, install_domain):
+    name = install_domain("late", "import time\ntime.sleep(5.0)\n")
+    request = impatient(0.01)  # 0.3 s
+    settings = replace(request.settings, domain=DomainChoice(name, "default"))
+    processes = replace(request, settings=settings, in_process=False)
     with pytest.raises(NotReadyError) as raised:
         run(processes, lambda *_: None)
     assert_advised(str(raised.value))
