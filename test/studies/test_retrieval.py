@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode
-from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.skills.domain_choice import NO_SKILLS, DomainChoice, open_domain
 from slap_ros.studies.lg_sail.acquisition import learned_skills
 from slap_ros.studies.lg_sail.retrieval import Known, try_in_place
 
@@ -26,11 +26,9 @@ def test_another_skill_acts_in_the_place_of_the_own_one():
     assert try_in_place(PEGS, "Insert", None, 1, 500) == own  # the library is as it was
 
 
-def test_where_no_skill_ships_none_is_tried():
-    assert try_in_place(DomainChoice("bowls"), "Pick", shipped("peg_in_hole", "Pick"), 1, 500) == (
-        0,
-        0,
-    )
+def test_where_a_domain_has_no_skill_none_is_tried():
+    bare = DomainChoice("bowls", skills=NO_SKILLS)
+    assert try_in_place(bare, "Pick", shipped("peg_in_hole", "Pick"), 1, 500) == (0, 0)
 
 
 @pytest.mark.parametrize(
