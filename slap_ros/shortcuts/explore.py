@@ -266,7 +266,7 @@ class Explorer:
         to_go = steps_to_goal(self.graph, operator_steps)
         candidates: list[ShortcutCandidate] = []
         for origin in self._origins(vertices):
-            if most_rollout_steps(self._domain, self._settings, origin.state) > self._left:
+            if not self._affords_rollouts(origin.state):
                 break
             for abstract, reached in self._roll_out(origin).items():
                 if len(reached.lengths) < self._settings.hits:
@@ -291,6 +291,14 @@ class Explorer:
         """Environment steps that are left of the budget; infinite where there is none."""
         budget = self._settings.budget
         return budget - self._taken if budget else float("inf")
+
+    def _affords_rollouts(self, state: State) -> bool:
+        """Whether what is left of the budget is enough for all rollouts from a state."""
+        # Without a budget nobody needs to know which objects are within reach.
+        settings = self._settings
+        return not settings.budget or (
+            most_rollout_steps(self._domain, settings, state) <= self._left
+        )
 
     def _origins(self, vertices: Sequence[Vertex]) -> Iterator[RolloutOrigin]:
         """Yield where rollouts begin: in vertices, and inside the options that led there.
