@@ -18,6 +18,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 AGAIN_S = 0.05  # s, after which a signal is sent again that fell where nothing can be raised
+IMPORTING = "<frozen importlib._bootstrap>"  # the file of the frames that import a module
 WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
@@ -131,12 +132,24 @@ def _exit_at_once(number: int, _: FrameType | None) -> None:
     os._exit(128 + number)
 
 
-def _raise(number: int, _: FrameType | None) -> None:
-    raise TerminatedError if number == signal.SIGTERM else KeyboardInterrupt
+def _raise(number: int, frame: FrameType | None) -> None:
+    error = TerminatedError() if number == signal.SIGTERM else KeyboardInterrupt()
+    if not _importing(frame):
+        raise error
+    _send_again(error)
+
+
+def _importing(frame: FrameType | None) -> bool:
+    """Whether a module is being imported: compiled ones may drop what is raised meanwhile."""
+    while frame is not None:
+        if frame.f_code.co_filename == IMPORTING:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _send_again(error: KeyboardInterrupt) -> None:
-    """Deliver a signal once more that arrived in a destructor, from which nothing can be raised."""
+    """Deliver a signal once more, a little later, that arrived where nothing can be raised."""
     number = signal.SIGTERM if isinstance(error, TerminatedError) else signal.SIGINT
     timer = threading.Timer(AGAIN_S, os.kill, (os.getpid(), number))
     timer.daemon = True

@@ -149,33 +149,45 @@ def test_a_run_closes_its_bag(network, tmp_path):
     assert not found.runs[-1].success
 
 
-IN_A_DESTRUCTOR = """
+DROPS_IT = """
 import os, signal, time
 from slap_ros.signals import exit_at_once_on_signals, exit_code, signals_raised
 
+def send():
+    os.kill(os.getpid(), {number})
+    for _ in range(1000):  # somewhere here the signal is noticed
+        pass
+
 class Last:
     def __del__(self):
-        os.kill(os.getpid(), {number})
-        for _ in range(1000):  # somewhere here the signal is noticed
-            pass
+        send()
 
-exit_at_once_on_signals()
+if __name__ == "__main__":
+    exit_at_once_on_signals()
+    try:
+        with signals_raised():
+            {statement}
+            time.sleep(60)
+    except KeyboardInterrupt as error:
+        raise SystemExit(exit_code(error))
+"""
+AS_CYTHON_DOES = """
+from program import send
 try:
-    with signals_raised():
-        Last()
-        time.sleep(60)
-except KeyboardInterrupt as error:
-    raise SystemExit(exit_code(error))
+    send()
+except KeyboardInterrupt:
+    pass
 """
 
 
+@pytest.mark.parametrize("statement", ["Last()", "import compiled"])
 @pytest.mark.parametrize("number", ENDINGS)
-def test_a_signal_that_falls_into_a_destructor_is_not_lost(number):
-    """Python drops what is raised there, and would go on."""
-    code = IN_A_DESTRUCTOR.format(number=int(number))
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT_S
-    )
+def test_a_signal_that_falls_where_errors_are_dropped_is_not_lost(number, statement, tmp_path):
+    """Python drops what is raised in a destructor, compiled modules what is while they load."""
+    (tmp_path / "program.py").write_text(DROPS_IT.format(number=int(number), statement=statement))
+    (tmp_path / "compiled.py").write_text(AS_CYTHON_DOES)
+    command = [sys.executable, "program.py"]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT_S)
     assert run.returncode == ENDINGS[number][1]
     assert not run.stderr
 
