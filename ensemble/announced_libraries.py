@@ -15,8 +15,8 @@ from pathlib import Path
 from slap_msgs.msg import SkillLibrary
 
 from slap_ros.errors import InvalidLibraryError
+from slap_ros.learning.grown_libraries import GrownLibraries
 
-SHORTCUTS = "shortcuts"  # folder beside the skills in the results of `slap grow`
 KEPT = 32  # folders: those that were announced last
 
 
@@ -78,7 +78,9 @@ class AnnouncedLibraries:
             The folder; None where these skills were not announced, or nothing is beside them.
         """
         announced = (key for key in reversed(self._digests) if self._digests[key] == digest)
-        folders = (at.parent / SHORTCUTS for name, at in announced if name == domain)
+        folders = (
+            GrownLibraries.with_skills(at).shortcuts for name, at in announced if name == domain
+        )
         for beside in map(Path.resolve, folders):
             if self._may_open(beside) and beside.is_dir():
                 return beside

@@ -22,6 +22,7 @@ from slap_ros.api.growth_page import growth_page
 from slap_ros.api.training import Unwatched, train
 from slap_ros.errors import UnsolvableError
 from slap_ros.files import require_writable, sole_use, write_whole
+from slap_ros.learning.grown_libraries import GrownLibraries
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.policies.library_files import replace_folder
 from slap_ros.shortcuts.jobs import VALIDATION
@@ -246,13 +247,13 @@ def _train(
         jobs: Number of processes; None for this one.
         watch: Functions that are called.
     """
-    here = request.round_folder(number)
-    choice = DomainChoice(request.domain.name, request.domain.preset, str(here / "skills"))
+    here = GrownLibraries(request.round_folder(number))
+    choice = DomainChoice(request.domain.name, request.domain.preset, str(here.skills))
     with watch.shortcuts() as callback:
         notes = TrainingNotes(callback)
         library = train(
             open_domain(choice),
-            here / "shortcuts",
+            here.shortcuts,
             seed=request.seed,
             settings=request.shortcut_settings,
             changes=request.affordable_changes(left),
@@ -303,9 +304,9 @@ class TrainingNotes:
 
 def _save(request: GrowthRequest, grown: Grown) -> None:
     """Write the libraries of the best round, and the page."""
-    best = request.round_folder(grown.best)
-    for name in ("skills", "shortcuts"):
-        _copy(best / name, request.folder / name)
+    best, final = GrownLibraries(request.round_folder(grown.best)), GrownLibraries(request.folder)
+    _copy(best.skills, final.skills)
+    _copy(best.shortcuts, final.shortcuts)
     write_whole(request.folder / PAGE, growth_page(request, grown.rounds, grown.best, grown.ended))
 
 

@@ -17,6 +17,7 @@ from slap_ros.api.proposers import Proposers
 from slap_ros.api.training import chosen_settings
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.grown_libraries import GrownLibraries
 from slap_ros.shortcuts.exploration_steps import usual_steps
 from slap_ros.shortcuts.settings import NEAR, TrainingSettings
 
@@ -216,7 +217,7 @@ class GrowthRequest:
         here = self.round_folder(number)
         first = AcquisitionRequest(
             domain=self.domain,
-            library_folder=here / "skills",
+            library_folder=GrownLibraries(here).skills,
             work_folder=here / "skills-training",
             proposers=self.proposers,
             goal=self.goal,
@@ -230,12 +231,12 @@ class GrowthRequest:
         )
         if not number:
             return first
-        before = self.round_folder(number - 1)
+        before = GrownLibraries(self.round_folder(number - 1))
         return replace(
             first,
             begin_with=(),
-            keep=before / "skills",
-            shortcuts=before / "shortcuts",
+            keep=before.skills,
+            shortcuts=before.shortcuts,
             proposal_of=self.round_folder(0) / "skills-training",
         )
 

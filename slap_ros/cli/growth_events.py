@@ -16,6 +16,7 @@ from typing import Any
 from slap_ros.api.growing import Grown
 from slap_ros.api.growth import GrowthRound
 from slap_ros.cli.console import print_json
+from slap_ros.learning.grown_libraries import GrownLibraries
 from slap_ros.shortcuts.training import CandidateGroup, TrainingCallback
 
 
@@ -54,10 +55,10 @@ class GrowthEvents:
             folder: Folder of all results.
             grown: What has grown.
         """
-        best = grown.rounds[grown.best]
+        best, saved = grown.rounds[grown.best], GrownLibraries(folder)
         data = {
-            "library": str((folder / "skills").resolve()),
-            "shortcut_library": str((folder / "shortcuts").resolve()),
+            "library": str(saved.skills.resolve()),
+            "shortcut_library": str(saved.shortcuts.resolve()),
             "rounds": len(grown.rounds),
             "best": grown.best + 1,
             "progress": best.progress,

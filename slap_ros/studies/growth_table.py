@@ -12,6 +12,7 @@ from typing import Any
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import mean_interval
 from slap_ros.files import parse_json, read_text
+from slap_ros.learning.grown_libraries import GrownLibraries
 from slap_ros.policies.shipped_models import shipped_folder
 from slap_ros.skills.skill_library import read_library_record
 from slap_ros.studies.results import MarkdownTable
@@ -49,7 +50,7 @@ def growth_table(results: Path) -> MarkdownTable:
 def _growth(evaluation: Path) -> dict[str, Any]:
     """An evaluation's rows by approach, and the seed of the skills."""
     rows = {row["approach"]: row for row in parse_json(read_text(evaluation))["approaches"]}
-    seed = read_library_record(evaluation.parent / "skills")["seed"]
+    seed = read_library_record(GrownLibraries(evaluation.parent).skills)["seed"]
     return {"seed": seed, **rows}
 
 
