@@ -7,17 +7,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.relational import Feature, Object, State
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.tracking import PoseEstimate
 from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
+from slap_ros.worlds.joint_space.arm import Arm, Obstacle
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
+from slap_ros.worlds.joint_space.raising import Configuration, off_fixed_bodies
 from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.settling import resting_poses
 from slap_ros.worlds.panda import FINGER_OPEN, JOINT_HIGH, JOINT_LOW, hand_pose
 
 BEYOND_LIMIT = 0.02  # rad, by which a joint at its limit may be measured beyond it
+# m, by which the arm may be measured deeper in a fixed body than the model has it: its hand is not
+# the model's box, and what is pressed upon gives way.
+TOO_DEEP = 0.003
 
 Changes = dict[tuple[Object, str], float]
 
@@ -53,10 +59,13 @@ class StateAssembler:
 
         Returns:
             The state: resting objects stand upon one another, what is held is where the hand is,
-            and objects that are not detected are as in the template.
+            an arm that is a little too deep in a fixed body is raised, and objects that are not
+            detected are as in the template.
         """
-        changes = self._robot_changes(reading, grasp)
-        flat = self._resting_poses(known)
+        fixed = self._fixed_boxes(known)
+        joints = self._joints_outside(possible_joints(reading.joints), grasp, fixed)
+        changes = self._robot_changes(joints, grasp)
+        flat = self._resting_poses(known, fixed)
         for obj, estimate in known.items():
             pose = estimate.pose
             if obj in self._bodies:
@@ -65,28 +74,49 @@ class StateAssembler:
                 changes |= _named(obj, VELOCITY_FEATURES, motion) | {(obj, "held"): 0.0}
             changes |= _pose_changes(obj, pose)
         if grasp is not None:
-            hand = hand_pose(possible_joints(reading.joints))
+            hand = hand_pose(joints)
             changes |= _pose_changes(grasp.obj, hand.compose(grasp.pose))
             changes |= _named(grasp.obj, VELOCITY_FEATURES, (*ORIGIN, *ORIGIN))
             changes |= {(grasp.obj, "held"): 1.0}
         return self._template.replace(changes)
 
-    def _robot_changes(self, reading: JointReading, grasp: Grasp | None) -> Changes:
+    def _joints_outside(
+        self, joints: Sequence[float], grasp: Grasp | None, fixed: Sequence[OrientedBox]
+    ) -> Configuration:
+        """The joints with the arm raised where it is a little too deep in a fixed body."""
+        if grasp is None:
+            held, pose, finger = None, IDENTITY, FINGER_OPEN
+        else:
+            held, pose = self._scene.free[self._bodies.index(grasp.obj)], grasp.pose
+            finger = grasp.finger
+        return off_fixed_bodies(
+            tuple(joints),
+            tuple(joints),
+            lambda q: Arm.at(q, finger, held, pose),
+            [Obstacle.of(box) for box in fixed],
+            TOO_DEEP,
+        )
+
+    def _robot_changes(self, joints: Configuration, grasp: Grasp | None) -> Changes:
         pose = IDENTITY if grasp is None else grasp.pose
         finger = FINGER_OPEN if grasp is None else grasp.finger
         return {
-            **_named(self._robot, JOINT_FEATURES, possible_joints(reading.joints)),
+            **_named(self._robot, JOINT_FEATURES, joints),
             **_named(self._robot, GRASP_FEATURES, (*pose.position, *pose.quaternion)),
             (self._robot, "finger"): finger,
         }
 
-    def _resting_poses(self, known: Mapping[Object, PoseEstimate]) -> dict[int, Pose]:
-        """Where physics would have objects that do not move, by the index of their body."""
-        fixed = [
+    def _fixed_boxes(self, known: Mapping[Object, PoseEstimate]) -> list[OrientedBox]:
+        return [
             body.at(self._fixed_pose(body.name, body.pose, known))
             for body in self._scene.fixed
             if body.solid
         ]
+
+    def _resting_poses(
+        self, known: Mapping[Object, PoseEstimate], fixed: Sequence[OrientedBox]
+    ) -> dict[int, Pose]:
+        """Where physics would have objects that do not move, by the index of their body."""
         steady = {
             i: known[o].pose for i, o in enumerate(self._bodies) if o in known and known[o].at_rest
         }

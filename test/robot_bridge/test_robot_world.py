@@ -18,6 +18,7 @@ from slap_ros.errors import (
 )
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY, Pose
+from slap_ros.motion import linear_motion, shifted
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
 from slap_ros.robot.robot_world import GripperAction, RobotWorld
@@ -25,12 +26,18 @@ from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 from slap_ros.robot.state_assembly import possible_joints
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES
-from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW, hand_pose
+from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW, grasp_pose, hand_pose
 
 DOMAIN = get_domain("obstacle_tower", "fair")
 TASK = DOMAIN.task(1)
 LIMITS = PANDA.scaled(0.5, Workspace())
+DOWN_TO_THE_TABLE = PANDA.scaled(1.0, Workspace((0.0, -0.8, 0.0), (0.9, 0.8, 0.9)))
 STEPS = np.zeros(8)
+
+
+def joints_of(state):
+    (robot,) = [o for o in state.objects if o.type.name == "robot"]
+    return tuple(float(state.get(robot, f.name)) for f in JOINT_FEATURES)
 
 
 class Bench:
@@ -64,8 +71,7 @@ class Bench:
             )
 
     def joints(self):
-        (robot,) = [o for o in self.world.state.objects if o.type.name == "robot"]
-        return tuple(float(self.world.state.get(robot, f.name)) for f in JOINT_FEATURES)
+        return joints_of(self.world.state)
 
     def gap(self):
         (robot,) = [o for o in self.world.state.objects if o.type.name == "robot"]
@@ -376,7 +382,7 @@ def test_an_arm_that_was_moved_by_hand_is_not_sent_on():
 
 def test_an_arm_never_enters_the_table_whatever_is_commanded():
     """Commands that go down and down end on it: a state with the arm in the table is refused."""
-    bench = Bench(limits=PANDA.scaled(1.0, Workspace((0.0, -0.8, 0.0), (0.9, 0.8, 0.9))))
+    bench = Bench(limits=DOWN_TO_THE_TABLE)
     down = np.array([0.0, 0.053, *[0.0] * 6])
     yielded = 0
     for _ in range(25):
@@ -388,6 +394,43 @@ def test_an_arm_never_enters_the_table_whatever_is_commanded():
         yielded += not np.allclose(way, down[:7])
         bench.world.step(np.array([*way, 0.0]))
     assert yielded > 5
+
+
+def lowest_valid(bench):
+    """The joints with the hand as low beside the blocks as the model has it, to 0.2 mm."""
+    (robot,) = [obj for obj in TASK.initial_state.objects if obj.type.name == "robot"]
+    joints = (0.9, *HOME[1:])
+    while True:
+        lower = lowered(joints, 0.0002)
+        named = zip(JOINT_FEATURES, lower, strict=True)
+        try:
+            bench.world.reset(TASK.initial_state.replace({(robot, f.name): q for f, q in named}))
+        except InvalidStateError:
+            return joints
+        joints = lower
+
+
+def lowered(joints, depth):
+    """The joints with the hand lower by so many metres."""
+    way = linear_motion(joints, shifted(grasp_pose(joints), (0.0, 0.0, -depth)))
+    return tuple(float(q) for q in way[-1])
+
+
+def test_a_hand_that_presses_on_the_table_is_a_state_unless_it_is_deep_in_it():
+    """A robot's hand is not the model's box: it may press lower than the model ever goes."""
+    bench = Bench(limits=DOWN_TO_THE_TABLE)
+    bench.measure()
+    for depth, refused in ((0.002, False), (0.01, True)):
+        since, measured = bench.now, lowered(lowest_valid(bench), depth)
+        bench.joints = lambda measured=measured: measured
+        bench.measure()
+        if refused:
+            with pytest.raises(InvalidStateError, match="inside a fixed body"):
+                bench.robot_world.measure(since)
+            continue
+        joints = joints_of(bench.robot_world.measure(since))
+        assert 0.001 < grasp_pose(joints).position[2] - grasp_pose(measured).position[2] < 0.003
+        assert bench.robot_world.plan_command(STEPS)  # the arm counts as standing where it is
 
 
 def test_domains_without_a_panda_and_presets_that_jump_are_refused():

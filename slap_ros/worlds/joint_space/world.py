@@ -16,20 +16,19 @@ from slap_ros.relational import Feature, State
 from slap_ros.worlds.features import JOINT_FEATURES
 from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Penetration, Sweep
 from slap_ros.worlds.joint_space.gripper import grip
+from slap_ros.worlds.joint_space.raising import (
+    MAX_RAISES,
+    off_fixed_bodies,
+    raised,
+    within_limits,
+)
 from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.simulation import Drive, Stepping
 from slap_ros.worlds.joint_space.simulation_pool import acquire, release
 from slap_ros.worlds.joint_space.snapshot import SceneIndex, Snapshot
 from slap_ros.worlds.joint_space.validation import require_valid
 from slap_ros.worlds.layout_index import BodyState
-from slap_ros.worlds.panda import (
-    HAND,
-    JOINT_HIGH,
-    JOINT_LOW,
-    MAX_STEP,
-    grasp_pose,
-    vertical_jacobian,
-)
+from slap_ros.worlds.panda import HAND, MAX_STEP, grasp_pose
 from slap_ros.worlds.simulated_world import SimulatedWorld
 
 ACTION_SPACE = ActionSpace(
@@ -46,8 +45,6 @@ REST_SHIFT = 2e-4  # m, along each axis
 REST_TURN = 1e-3  # 1, of each component of the quaternion
 PRESS_LIMIT = 0.006  # m, how far the arm may press bodies into one another; deeper, it yields
 JAM_LIMIT = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
-MAX_RAISES = 8  # times that the arm is raised so that it does not enter a fixed body
-RAISE_CLEARANCE = 1e-4  # m, over where it just does not
 CACHE_SIZE = 256  # arrangements of bodies of which it is known whether they are stable
 
 
@@ -129,7 +126,7 @@ class PandaWorld(SimulatedWorld[Scene]):
         start = self._posture
         if gripped is not self._snapshot:  # the fingers are still where they were
             start = self._arm(replace(gripped, finger=self._snapshot.finger))
-        goal = replace(gripped, joints=_within_limits(gripped.joints, displacement))
+        goal = replace(gripped, joints=within_limits(gripped.joints, displacement))
         self._snapshot, self._posture = self._after(gripped, goal, start)
         self._state = self._index.write(self._state, self._snapshot)
         return self._state
@@ -150,16 +147,14 @@ class PandaWorld(SimulatedWorld[Scene]):
         Returns:
             Joint positions within a step of the start, raised where that is needed and possible.
         """
-        goal = self._snapshot
-        for _ in range(MAX_RAISES):
-            arm = self._arm(goal)
-            penetration = Sweep(arm, arm).deepest_penetration(self._obstacles, depth)
-            if penetration is None:
-                return goal.joints
-            if penetration.depth > highest:
-                break
-            goal = replace(goal, joints=_raised(start, goal.joints, penetration))
-        return self._snapshot.joints
+        return off_fixed_bodies(
+            start,
+            self._snapshot.joints,
+            lambda joints: self._arm(replace(self._snapshot, joints=joints)),
+            self._obstacles,
+            highest,
+            depth,
+        )
 
     def _gripped(self, command: float) -> Snapshot:
         """How things are once the gripper acted, if it can."""
@@ -197,7 +192,7 @@ class PandaWorld(SimulatedWorld[Scene]):
             penetration = sweep.deepest_penetration(self._obstacles)
             if penetration is None:
                 return now if sweep.hits(self._obstacles) else goal
-            goal = replace(goal, joints=_raised(now.joints, goal.joints, penetration))
+            goal = replace(goal, joints=raised(now.joints, goal.joints, penetration))
         return now
 
     def _arm(self, snapshot: Snapshot) -> Arm:
@@ -253,13 +248,6 @@ class PandaWorld(SimulatedWorld[Scene]):
         return stable
 
 
-def _within_limits(joints: tuple[float, ...], displacement: list[float]) -> tuple[float, ...]:
-    moved = (q + d for q, d in zip(joints, displacement, strict=True))
-    return tuple(
-        min(max(q, low), high) for low, q, high in zip(JOINT_LOW, moved, JOINT_HIGH, strict=True)
-    )
-
-
 def _half_way(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     """The goal half as far away: what is pressed has more time to give way."""
     del depth
@@ -278,24 +266,7 @@ def _hand_raised(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     if goal.joints == now.joints:
         return now
     penetration = Penetration(HAND, grasp_pose(goal.joints).position, depth)
-    return replace(goal, joints=_raised(now.joints, goal.joints, penetration))
-
-
-def _raised(
-    start: tuple[float, ...], goal: tuple[float, ...], penetration: Penetration
-) -> tuple[float, ...]:
-    """The goal with a point raised, fast joints first; within the speed limit from the start."""
-    rates = vertical_jacobian(goal, penetration.link, penetration.point)
-    weights = [rate * step * step for rate, step in zip(rates, MAX_STEP, strict=True)]
-    yielding = sum(rate * weight for rate, weight in zip(rates, weights, strict=True))
-    if yielding <= 0.0:
-        return start
-    lift = (penetration.depth + RAISE_CLEARANCE) / yielding
-    displacement = [
-        min(max(g + lift * weight - s, -step), step)
-        for g, s, weight, step in zip(goal, start, weights, MAX_STEP, strict=True)
-    ]
-    return _within_limits(start, displacement)
+    return replace(goal, joints=raised(now.joints, goal.joints, penetration))
 
 
 def _rests(before: BodyState, after: BodyState) -> bool:
