@@ -56,6 +56,7 @@ _VALUES: Mapping[type, Callable[[str], Any]] = {
     bool: {"true": True, "false": False}.__getitem__,
     tuple: lambda text: tuple(map(float, text.split())),
 }
+_WANTED = {bool: "true or false", int: "a whole number"}
 
 
 def parse_parameters(
@@ -90,8 +91,10 @@ def parse_parameters(
         try:
             found[name] = _VALUES.get(kinds[name], kinds[name])(value)
         except (ValueError, KeyError):
-            kind = "true or false" if kinds[name] is bool else "a number"
-            raise InvalidParameterError(f"the {what}'s {name} is {kind}, not {value!r}") from None
+            wanted = _WANTED.get(kinds[name], "a number")
+            raise InvalidParameterError(
+                f"the {what}'s {name} must be {wanted}, not {value!r}"
+            ) from None
         _require_within(f"the {what}'s {name}", found[name], known_fields[name].metadata)
     return found
 

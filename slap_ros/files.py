@@ -141,12 +141,14 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file, text in UTF-8: at every moment there is the old one, or the new one, whole.
 
     Raises:
-        OSError: It cannot be written; the old one is untouched.
+        OSError: It cannot be written, and names the file; the old one is untouched.
     """
     draft = path.with_name(f".{path.name}.tmp")
     try:
         draft.write_bytes(content.encode() if isinstance(content, str) else content)
         draft.replace(path)
+    except OSError as error:  # a full disk names no file
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:  # after Ctrl-C too
         with suppress(OSError):
             draft.unlink(missing_ok=True)

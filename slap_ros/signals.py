@@ -9,6 +9,7 @@ thing that a command does.
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -49,8 +50,11 @@ def forget_interrupt() -> None:
 def exit_at_once_on_signals() -> None:
     """Let a signal end the process with a line and a code, from now on.
 
-    A signal that is ignored, as by ``nohup``, stays so.
+    A signal that is ignored, as by ``nohup``, stays so. Once the interpreter is torn down, whose
+    work is done by then, signals are ignored: with no handler left they would kill it, code and
+    all.
     """
+    atexit.register(_ignore_from_now_on)  # the first to be registered is the last to be called
     for number in WORDS:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _exit_at_once)
@@ -124,6 +128,12 @@ def signals_held_back() -> Iterator[None]:
             signal.signal(number, _raise)
         if arrived:
             signal.raise_signal(arrived[0])
+
+
+def _ignore_from_now_on() -> None:
+    for number in WORDS:
+        if signal.getsignal(number) is _exit_at_once:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _exit_at_once(number: int, _: FrameType | None) -> None:

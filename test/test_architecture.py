@@ -41,6 +41,7 @@ FLOORS = (
         "versions",
         "files",
         "signals",
+        "whole_numbers",
         "portable_math",
         "redaction",
         "errors",

@@ -5,6 +5,8 @@
 import ast
 import os
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -163,6 +165,31 @@ OWN = {
     "compilation.py",
     "report/page.py",
 }
+
+
+FULL = """
+import resource, signal, sys
+from pathlib import Path
+from slap_ros.files import write_whole
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (8, 8))
+try:
+    write_whole(Path(sys.argv[1]), "more than there is room for")
+except OSError as error:
+    print(error.filename)
+"""
+
+
+def test_what_there_is_no_room_for_is_named_and_leaves_what_was_there(tmp_path):
+    path = tmp_path / "kept.json"
+    path.write_text("old")
+    run = subprocess.run(
+        [sys.executable, "-c", FULL, path], capture_output=True, text=True, timeout=60
+    )
+    assert run.stdout == f"{path}\n", run.stderr
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_nobody_opens_files_in_other_ways():

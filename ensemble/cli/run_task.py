@@ -225,6 +225,13 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
     Raises:
         SlapError: It is no goal of the task; or planner, library or pictures are not there.
     """
+    if options.grow:
+        # What is made of acquired skills takes a fifth of this command's imports.
+        from slap_ros.skills.skill import approach_of
+
+        approach_of(domain)
+    elif options.shortcuts == GROWN:
+        raise InvalidParameterError("shortcuts that are grown need --grow, which grows them")
     with suppress(*(NoSkillsError,) if options.learns else ()):
         make_planner(options.planner_choice, domain, task.initial_state)
     chosen_library(options.shortcuts, domain, options.planner_choice)
@@ -301,6 +308,8 @@ def _conclude(metrics: RunMetrics, record: Path | None) -> None:
                 f"{known(metrics.edges_rolled_out)} edges rolled out",
             )
         )
+        if metrics.error_code:  # of what was asked for besides
+            console.print(styled("error", "bold red", f" {metrics.error_msg}"))
     else:
         verdict = "not known whether solved" if metrics.success is None else "not solved"
         console.print(styled(verdict, "bold red", f": {metrics.error_msg}"))

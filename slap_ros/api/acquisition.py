@@ -96,7 +96,7 @@ def acquire(
     settings: str = "small",
     changes: Changes = (),
     steps: int | None = None,
-    begin_with: Sequence[Path | str] = (),
+    begin_with: Path | str | Sequence[Path | str] = (),
     work: Path | str | None = None,
     jobs: int | None = None,
     watch: AcquisitionWatch = AcquisitionWatch(),
@@ -115,7 +115,7 @@ def acquire(
         settings: Name of the hyper-parameters of networks and SAC.
         changes: Settings to change, by dotted name; or texts as on the command line.
         steps: Environment steps for all skills together; None for those of the settings.
-        begin_with: Folders of skill libraries that new skills may begin with.
+        begin_with: Folder of a skill library that new skills may begin with, or several.
         work: Folder for checkpoints; None for one beside the library's folder.
         jobs: Number of processes; None for this one. A script that uses processes needs
             ``if __name__ == "__main__"``.
@@ -141,9 +141,13 @@ def acquire(
         settings=settings,
         changes=change_texts(changes),
         steps=steps,
-        begin_with=[Path(path) for path in begin_with],
+        begin_with=_folders(begin_with),
     )
     return carry_out(request, jobs, watch=watch)
+
+
+def _folders(given: Path | str | Sequence[Path | str]) -> list[Path]:
+    return [Path(given)] if isinstance(given, Path | str) else [Path(path) for path in given]
 
 
 def acquirable(name: str, preset: str | None) -> Domain:

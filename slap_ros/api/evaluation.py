@@ -19,6 +19,7 @@ from slap_ros.planning.planner import make_planner
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
+from slap_ros.whole_numbers import require_whole
 
 SKILLS_ALONE = "skills"  # name of planning without shortcuts, where skills were acquired
 OnTrial = Callable[[Approach, Trial], None]
@@ -118,11 +119,15 @@ def evaluate(
         A row per approach and task, approach by approach, in the order of seeds and indices.
 
     Raises:
-        InvalidParameterError: There is no such planner, or it cannot use shortcuts.
+        InvalidParameterError: There is no such planner, or it cannot use shortcuts; or a number
+            that cannot be.
         NoSkillsError: The domain has no skills yet.
         UnknownGoalError: There is no such goal.
         InvalidLibraryError: The library cannot be used as a whole.
     """
+    for name, number in (("tasks", tasks), ("seeds", seeds)):
+        require_whole(name, number, least=1)
+    require_whole("first_seed", first_seed)
     library = choose_library(shortcuts, domain, planner, warn_caller)
     compared = compared_approaches(library, domain, samples, compare_shooting)
     skills = DomainChoice.opened_as(domain).skills

@@ -94,6 +94,7 @@ class Run(ShownInNotebooks):
         Raises:
             BagExistsError: There is something; it is left alone.
             StorageFullError: There is no room.
+            OSError: There can be no folder.
         """
         record_run(folder, self.domain, self.task, self.episode, self.began_ns)
         return Path(folder)

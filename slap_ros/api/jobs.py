@@ -9,13 +9,21 @@ from importlib.util import find_spec
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.workers import SequentialWorkers, Workers, local_workers, ray_workers
+from slap_ros.whole_numbers import require_whole
 
 
 def some_workers(jobs: int | None, ray: str | None = None) -> AbstractContextManager[Workers]:
-    """So many processes, this one for None, or the Ray cluster at an address."""
+    """So many processes, this one for None, or the Ray cluster at an address.
+
+    Raises:
+        InvalidParameterError: No number of processes, or no such cluster.
+    """
     if ray is not None:
         return ray_workers(ray)
-    return nullcontext(SequentialWorkers()) if jobs is None else local_workers(jobs)
+    if jobs is None:
+        return nullcontext(SequentialWorkers())
+    require_whole("jobs", jobs, least=1)
+    return local_workers(jobs)
 
 
 def require_torch() -> None:

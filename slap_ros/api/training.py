@@ -25,6 +25,7 @@ from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, save_library
 from slap_ros.shortcuts.subgoals import SubgoalTraining
 from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
 from slap_ros.skills.domain_choice import WORDS, DomainChoice
+from slap_ros.whole_numbers import require_whole
 
 
 class Unwatched:
@@ -87,6 +88,7 @@ def train(
         BusyError: Another process trains in the same folder.
     """
     require_skills(domain)
+    require_whole("seed", seed)
     chosen = chosen_settings(domain, settings, changes, steps)
     library_folder, work_folder = Path(folder), training_folder(folder, work)
     for place in (library_folder, work_folder):

@@ -8,6 +8,7 @@ whatever would control the terminal is shown instead of sent.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
@@ -119,9 +120,12 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
             advice = "out of memory; fewer jobs or tasks at once need less"
             _fail(ErrorCode.OUT_OF_MEMORY, advice, error)
         except OSError as error:
+            code = ErrorCode.INPUT_OUTPUT
             if error.filename is None:
                 _silence_stdout()  # it may be what failed; else nothing is lost
-            _fail(ErrorCode.INPUT_OUTPUT, _os_complaint(error), error)
+            elif error.errno in (errno.ENOSPC, errno.EDQUOT):
+                code = ErrorCode.STORAGE_FULL
+            _fail(code, _os_complaint(error), error)
         except (typer.Exit, typer.Abort):
             raise
         except Exception as error:

@@ -21,7 +21,6 @@ from slap_ros.core.task import Task
 from slap_ros.core.world import SyncVectorWorld, VectorWorld, World
 from slap_ros.errors import (
     InvalidDomainError,
-    InvalidParameterError,
     UnknownGoalError,
     UnknownObjectError,
 )
@@ -37,6 +36,7 @@ from slap_ros.relational import (
     ground_operators,
     static_predicates,
 )
+from slap_ros.whole_numbers import require_whole
 
 # Of a task that begins in a state; an UnknownObjectError where that lacks an object of the goal.
 Goal = Callable[[State], frozenset[GroundAtom]]
@@ -262,12 +262,12 @@ class Domain(ShownInNotebooks):
                 objects. None for the goal that comes with the task.
 
         Raises:
-            InvalidParameterError: A negative seed or index.
+            InvalidParameterError: A seed or an index that is negative or no whole number.
             UnknownGoalError: No such goal.
             UnknownObjectError: No task has the objects of that goal.
         """
-        if min(seed, index) < 0:
-            raise InvalidParameterError(f"seed {seed} and index {index} must not be negative")
+        require_whole("seed", seed)
+        require_whole("index", index)
         task = self._sampled(np.random.default_rng([seed, index]), goal)
         return replace(task, seed=seed, index=index)
 

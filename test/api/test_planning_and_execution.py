@@ -140,3 +140,27 @@ def test_a_plan_that_leads_nowhere_is_replaced(domain, task, plan):
     without = slap_ros.execute(domain, task, wrong, max_replans=0)
     assert not without.success
     assert "diverged" in without.error
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda domain, _: slap_ros.evaluate(domain, jobs=0), "jobs must be at least 1, not 0"),
+        (lambda domain, _: slap_ros.evaluate(domain, tasks=0), "tasks must be at least 1"),
+        (lambda domain, _: slap_ros.evaluate(domain, seeds=1.5), "a whole number, not 1.5"),
+        (lambda domain, _: slap_ros.evaluate(domain, first_seed=-1), "first_seed must be at"),
+        (lambda domain, _: domain.task(seed="1"), "seed must be a whole number, not '1'"),
+        (lambda domain, _: domain.task(seed=1, index=-1), "index must be at least 0, not -1"),
+        (lambda domain, folder: slap_ros.train(domain, folder, seed=-1), "seed must be at least"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused_before_anything_is_done(domain, tmp_path, call, words):
+    with pytest.raises(InvalidParameterError, match=words):
+        call(domain, tmp_path / "library")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_to_begin_with_may_be_given_alone(tmp_path):
+    bench = slap_ros.make("stack_at_target")
+    with pytest.raises(InvalidLibraryError, match="no/library: no such folder"):
+        slap_ros.acquire(bench, tmp_path / "skills", begin_with="no/library")

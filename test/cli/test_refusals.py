@@ -204,3 +204,18 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_run(
     assert result.exit_code == ErrorCode.INPUT_OUTPUT, result.stderr
     assert len(result.stderr.strip().splitlines()) == 1  # no word of a run
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "pipe.gif"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--grow"], "domain obstacle2d does not say what skills are acquired with"),
+        (["--shortcuts", "grown"], "need --grow"),
+        (["--acquire", "--acquisition", "steps=nan"], "steps must be a whole number, not 'nan'"),
+    ],
+)
+def test_what_a_run_could_not_learn_is_refused_before_it(options, words):
+    refused = slap("run", "obstacle2d", "--in-process", *options)
+    assert words in " ".join(refused.output.split())
+    assert refused.exit_code in (ErrorCode.INVALID_DOMAIN, ErrorCode.INVALID_PARAMETER)
+    assert "solved" not in refused.output

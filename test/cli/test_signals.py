@@ -192,6 +192,34 @@ def test_a_signal_that_falls_where_errors_are_dropped_is_not_lost(number, statem
     assert not run.stderr
 
 
+AT_THE_END = """
+import os, sys, time
+from slap_ros.signals import exit_at_once_on_signals, signals_raised
+
+class Last:
+    def __del__(self, write=os.write, sleep=time.sleep):
+        write(1, b"torn down")
+        sleep({rest_s})
+
+exit_at_once_on_signals()
+last = Last()  # until the modules go
+with signals_raised():
+    pass
+sys.exit(7)
+"""
+
+
+@pytest.mark.parametrize("number", ENDINGS)
+def test_a_signal_after_the_work_is_done_does_not_take_the_exit_code_away(number):
+    """While modules are torn down, Python has no handlers any more."""
+    code = AT_THE_END.format(rest_s=0.5)
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert process.stdout.read(1)
+    process.send_signal(number)
+    process.communicate(timeout=LIMIT_S)
+    assert process.returncode == 7
+
+
 IN_A_STRING = """
 import os, signal, typer
 from slap_ros.cli.console import exits
