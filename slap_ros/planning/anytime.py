@@ -3,10 +3,11 @@
 """A first plan soon, then better ones, and how far from the best they can be.
 
 A small abstract graph is searched as ``lazy`` does. In a larger one, the first plan is the one that
-the FF heuristic finds. Then the graph is searched with falling weights (as in Richter, Thayer and
-Ruml: The Joy of Forgetting: Faster Anytime Search via Restarting, ICAPS 2010): every search begins
-anew, but roll-outs are kept, so that it pays for what is new alone. The last one, without a weight,
-is the search of ``lazy``, and finds a plan of the same cost.
+the FF heuristic finds. Then the graph is searched as ``lazy`` does for a few roll-outs, which are
+enough where a shortcut leads almost to the goal, and with falling weights (as in Richter, Thayer
+and Ruml: The Joy of Forgetting: Faster Anytime Search via Restarting, ICAPS 2010): every search
+begins anew, but roll-outs are kept, so that it pays for what is new alone. The last one, without a
+weight, is the search of ``lazy``, and finds a plan of the same cost.
 
 Where there are too many abstract states, the graph near the best plan is searched
 (:mod:`slap_ros.planning.corridor`), shortcuts included, until that finds nothing shorter. Such a
@@ -40,6 +41,8 @@ from slap_ros.relational import State
 SMALL = 150  # abstract states of a graph in which nothing is gained by a first plan
 NEAR_PLANS = 4  # roll-outs of a whole graph to one of graphs near plans
 WEIGHTS = (30.0, 3.0, 1.0)  # of bounds of what is to come, one search after the other
+SOON = 20  # roll-outs of a first search without a weight: where shortcuts are good, it ends by then
+SEARCHES = ((1.0, SOON), *((weight, None) for weight in WEIGHTS))  # of a whole graph: roll-outs
 
 
 class PlanningInterrupted(KeyboardInterrupt):
@@ -142,6 +145,8 @@ class _Improvement:
         self._best: Plan | None = None
         self._no_first: PlanningLimitError | None = None  # why FF found no plan
         self._at_least = 0  # environment steps of any plan
+        shortcuts = planner.shortcuts
+        self._forget_failures = shortcuts.forget_failures_since_now() if shortcuts else _nothing
 
     def through(
         self, graph: AbstractGraph, add_shortcuts: Callable[[AbstractGraph], None]
@@ -161,8 +166,8 @@ class _Improvement:
                 self._limit += self._model.executed  # what was tried in vain
         add_shortcuts(graph)
         leads_to_goal = self._is_through(graph)
-        for weight in WEIGHTS[-1:] if is_small else WEIGHTS:
-            outcome = self._search(graph, weight)
+        for weight, rollouts in [(1.0, None)] if is_small else SEARCHES:
+            outcome = self._search(graph, weight, rollouts)
             leads_to_goal |= outcome.plan is not None
             if leads_to_goal:  # else a deeper graph may have a plan that is shorter
                 self._at_least = max(self._at_least, outcome.at_least or 0)
@@ -229,9 +234,15 @@ class _Improvement:
         self._take(first.plan)
         return first
 
-    def _search(self, graph: AbstractGraph, weight: float) -> SearchOutcome:
+    def _search(
+        self, graph: AbstractGraph, weight: float, rollouts: int | None = None
+    ) -> SearchOutcome:
         below = None if self._best is None else self._best.predicted_steps
-        limits = SearchLimits(weight, self._limit, below)
+        most = (
+            self._limit if rollouts is None else min(self._limit, self._model.executed + rollouts)
+        )
+        limits = SearchLimits(weight, most, below)
+        self._forget_failures()  # of searches that tried shortcuts elsewhere
         return search_lazily(graph, self._state, self._model, limits)
 
     def _take(self, plan: Plan | None) -> bool:
@@ -273,3 +284,7 @@ class _Improvement:
         sizes = (nodes, edges) if graph is None else (len(graph.nodes), len(graph.edges))
         simulated = self._planner.problem.model.executed - self._simulated_before
         return PlanningResult(self._best, *sizes, simulated, graph=graph, at_least=self._at_least)
+
+
+def _nothing() -> None:
+    """Nothing has failed."""

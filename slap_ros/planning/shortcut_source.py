@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Protocol
 
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
@@ -29,4 +29,11 @@ class ShortcutSource(Protocol):
 
     def relaxed(self) -> Sequence[RelaxedOperator]:
         """Each shortcut with all that it might add for any objects, as if it needed nothing."""
+        ...
+
+    def forget_failures_since_now(self) -> Callable[[], None]:
+        """What makes later failures count no more, by which a shortcut is given up.
+
+        Where one search has failed with a shortcut, another may try it elsewhere, and succeed.
+        """
         ...

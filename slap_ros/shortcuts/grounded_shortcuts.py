@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 
 from slap_ros.core import Domain
@@ -79,6 +79,10 @@ class GroundedShortcuts:
             RelaxedOperator(0, matcher.may_be_added, least_steps(shortcut))
             for shortcut, matcher in zip(self.shortcuts, self._matchers, strict=True)
         ]
+
+    def forget_failures_since_now(self) -> Callable[[], None]:
+        """See :class:`~slap_ros.planning.shortcut_source.ShortcutSource`."""
+        return self._rollouts.forget_failures_since_now()
 
     def option(self, name: str, source: int, target: Target, attempt: int = 0) -> Option | None:
         """A shortcut from an abstract state to a target.

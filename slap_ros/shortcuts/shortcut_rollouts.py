@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from hashlib import sha256
 from itertools import count
 
@@ -48,7 +48,8 @@ class ShortcutRollouts:
         self._worlds = TrialWorlds(domain, initial, sampling)
         self._cache: dict[Key, tuple[ShortcutRollout, ...]] = {}
         self._begun: dict[Key, ShortcutTrial] = {}
-        self._failures: Counter[str] = Counter()  # of each shortcut, beyond those expected
+        self._failures: Counter[str] = Counter()  # of each shortcut
+        self._successes: Counter[str] = Counter()
 
     def successes(
         self, shortcut: Shortcut, encoder: ObservationEncoder, state: State
@@ -106,11 +107,23 @@ class ShortcutRollouts:
         What was begun is finished where that decides about it.
         """
         mine = [key for key in self._begun if key[0] == shortcut.name]
-        while mine and self._failures[shortcut.name] + len(mine) >= MAX_NET_FAILURES:
+        while mine and self._net_failures(shortcut.name) + len(mine) >= MAX_NET_FAILURES:
             first = self._first_to_end(mine)
             mine.remove(first)
             self._finish(first)
-        return self._failures[shortcut.name] >= MAX_NET_FAILURES
+        return self._net_failures(shortcut.name) >= MAX_NET_FAILURES
+
+    def _net_failures(self, name: str) -> int:
+        return self._failures[name] - MAX_NET_FAILURES * self._successes[name]
+
+    def forget_failures_since_now(self) -> Callable[[], None]:
+        """See :class:`~slap_ros.planning.shortcut_source.ShortcutSource`."""
+        before = self._failures.copy()
+
+        def forget() -> None:
+            self._failures = before.copy()
+
+        return forget
 
     def _first_to_end(self, keys: Sequence[Key]) -> Key:
         """The trial that succeeds, or has failed, after the fewest steps: one success decides."""
@@ -140,6 +153,7 @@ class ShortcutRollouts:
     def _finish(self, key: Key) -> None:
         """Finish a trial, and keep what came of it."""
         self._cache[key] = self._begun.pop(key).successes()
-        self._failures[key[0]] += -MAX_NET_FAILURES if self._cache[key] else 1
+        outcomes = self._successes if self._cache[key] else self._failures
+        outcomes[key[0]] += 1
         if len(self._cache) > MOST_KEPT:
             del self._cache[next(iter(self._cache))]  # the oldest

@@ -125,6 +125,21 @@ def test_small_problems_are_solved_as_lazy_search_solves_them(shortcuts, tasks):
         assert [one.bound for one in found] == [1.0, 1.0]
 
 
+def test_a_shortcut_that_failed_in_one_search_is_tried_elsewhere_in_the_next():
+    """Here a search with a weight comes to three states first in which the shortcut fails."""
+    domain = get_domain("obstacle_tower", "fair")
+    task, library = domain.task(511), chosen_library(None, domain)
+    steps = []
+    for planner in ("lazy", "anytime"):
+        shortcuts = GroundedShortcuts(domain, library.shortcuts, task.initial_state)
+        made = make_planner(planner, domain, task.initial_state, shortcuts)
+        goal = domain.atom_space(task.initial_state).mask(task.goal)
+        found = made.plan(task.initial_state, goal)
+        assert planner == "lazy" or found.bound == 1.0
+        steps.append(found.steps)
+    assert steps[0] == steps[1] < 100
+
+
 @given(st.integers(1, 500), st.integers(0, 2000))
 def test_a_bound_as_text_is_a_bound_and_1_00_is_a_proof(least, more):
     bound = (least + more) / least

@@ -100,6 +100,9 @@ class MadeUpShortcuts:
     def relaxed(self):
         return [RelaxedOperator(0, self.added, self.skill.least_steps)]
 
+    def forget_failures_since_now(self):
+        return lambda: None
+
     def _option(self, attempt):
         def following():
             return self._option(attempt + 1) if attempt == 0 else None
