@@ -135,10 +135,13 @@ def test_what_follows_a_long_action_is_discounted_by_its_steps():
 # -- training -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["ppo", "hierarchical", *slow("sac", "sac-her", "sol")])
+@pytest.mark.parametrize(
+    "method", ["ppo", "hierarchical", *slow("sac", "curriculum", "sac-her", "sol")]
+)
 def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     changes = {"n_envs": 2, "batch_size": 8, "validation": 1}
-    changes |= {"learning_starts": 102} if "sac" in method else {"n_steps": 16}
+    replays = method in ("sac", "curriculum", "sac-her")
+    changes |= {"learning_starts": 102} if replays else {"n_steps": 16}
 
     def stop(progress):
         if progress.steps >= 120 and not (tmp_path / "stopped").exists():
@@ -153,7 +156,7 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     assert 120 <= before < 200 <= record["environment_steps"] < 300
     with pytest.raises(InvalidParameterError, match="other settings"):
         train_baseline(method, domain, tmp_path / "x", **given, seed=1)
-    if "sac" in method:
+    if replays:
         assert np.load(tmp_path / "x-training" / REPLAY)["rewards"].size >= 100
     (tmp_path / "x-training" / "checkpoint.pt").write_bytes(b"PK damaged")
     with pytest.raises(InvalidParameterError, match=r"checkpoint\.pt: damaged"):
@@ -254,7 +257,7 @@ def test_more_objects_than_a_policy_has_room_for_count_as_failed(trained, domain
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("dreamer", "obstacle2d"), 2, "there are ppo, sac, sac-her, hierarchical, sol"),
+        (("dreamer", "obstacle2d"), 2, "there are ppo, sac, curriculum, sac-her"),
         (("ppo", "moon"), ErrorCode.UNKNOWN_DOMAIN, "moon"),
         (("ppo", "obstacle2d", "--settings", "best"), 15, "there are ours, paper"),
         (("ppo", "obstacle2d", "--set", "tau=1"), 15, "unknown setting 'tau'; there are n_envs"),
@@ -271,4 +274,4 @@ def test_what_there_is_not_is_refused(tmp_path, arguments, code, words):
 def test_methods_are_listed():
     code, said, _ = slap("baseline", "list", "--json")
     assert code == 0
-    assert list(json.loads(said)) == ["ppo", "sac", "sac-her", "hierarchical", "sol"]
+    assert list(json.loads(said)) == ["ppo", "sac", "curriculum", "sac-her", "hierarchical", "sol"]
