@@ -8,9 +8,10 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+from slap_ros.files import parse_json, read_text, write_whole
 from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 
-CURVE = "curve.jsonl"
+CURVE = "curve.json"
 TIMES = 10  # measurements of a training, beside the one before it
 
 
@@ -53,12 +54,12 @@ class ProgressCurve:
 
     def _add(self, steps: int) -> None:
         self.points.append((steps, self._measure()))
-        self._file.write_text("".join(json.dumps(point) + "\n" for point in self.points))
+        write_whole(self._file, json.dumps(self.points))
 
     def _read(self) -> list[tuple[int, float]]:
         try:
-            lines = map(json.loads, self._file.read_text(encoding="utf-8").splitlines())
-            return [(int(steps), float(progress)) for steps, progress in lines]
+            points = parse_json(read_text(self._file))
+            return [(int(steps), float(progress)) for steps, progress in points]
         except DECODING_ERRORS as error:
             advice = "remove the folder to train from the beginning"
             raise damaged(self._file, type(error).__name__, advice) from error

@@ -34,19 +34,19 @@ SLACK, SPARE = 2, 50  # steps allowed: so many times those of the demonstration,
 
 
 @dataclass(frozen=True)
-class DemonstratedTask:
-    """A solved task: the states from which there is a plan for its goal.
+class StartingPoints:
+    """A task that was solved, to begin it again on the way.
 
     Args:
         task: Task that was solved.
-        states: States on the way, without the last one; those without a plan are None.
+        states: States on the way, without the last one; None where there is no plan for the goal.
     """
 
     task: Task
     states: Sequence[State | None]
 
     @classmethod
-    def of(cls, domain: Domain, task: Task) -> DemonstratedTask | None:
+    def of(cls, domain: Domain, task: Task) -> StartingPoints | None:
         """Solve a task by the domain's skills; None where they do not, or it is solved already."""
         shown = demonstrate(domain, task)
         if not shown.episode.success:
@@ -86,7 +86,7 @@ def _has_plan(planner: SymbolicPlanner, abstract: int, goal: int) -> bool:
 class ReverseCurriculum:
     """How far before the end of demonstrations episodes begin, for all environments together."""
 
-    def __init__(self, demonstrations: Sequence[DemonstratedTask], tally: TrainingTally) -> None:
+    def __init__(self, demonstrations: Sequence[StartingPoints], tally: TrainingTally) -> None:
         """Begin near the end.
 
         Args:
@@ -139,7 +139,7 @@ class CurriculumTasks(TaskStream):
         return self.curriculum.start(whole, np.random.default_rng([self._seed, whole.index]))
 
 
-def demonstrated_tasks(env: TaskEnv, seed: int, number: int) -> list[DemonstratedTask]:
+def demonstrated_tasks(env: TaskEnv, seed: int, number: int) -> list[StartingPoints]:
     """Demonstrations of training tasks that no environment has.
 
     Args:
@@ -154,9 +154,9 @@ def demonstrated_tasks(env: TaskEnv, seed: int, number: int) -> list[Demonstrate
         UnsolvableError: The demonstrator fails too often.
     """
     domain, indices = _with_demonstrator(env.domain), iter(TRAINING.batch(number, EACH))
-    solved: list[DemonstratedTask] = []
+    solved: list[StartingPoints] = []
     for _ in range(MOST_TRIED):
-        shown = DemonstratedTask.of(domain, env.first_task(seed, indices))
+        shown = StartingPoints.of(domain, env.first_task(seed, indices))
         if shown is not None:
             solved.append(shown)
         if len(solved) == DEMONSTRATIONS:

@@ -87,6 +87,9 @@ def stepped_apart(
         envs: Environments, one at least.
         streams: Tasks of each environment.
         tally: Counts over all environments.
+
+    Returns:
+        The environments, whose episodes have not begun.
     """
 
     def make() -> DummyVecEnv:

@@ -87,6 +87,9 @@ def task_progress(baseline: Rival, preset: str, goal: str | None, seed: int, ind
         seed: Seed of the task.
         index: Index of the task among those of its seed.
 
+    Returns:
+        The share, from 0 to 1.
+
     Raises:
         InvalidStateError: The baseline cannot observe the task.
     """
