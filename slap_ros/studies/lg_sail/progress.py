@@ -60,8 +60,9 @@ deviation over trainings, and *solved* is the share of tasks with all stages don
 95 % interval. The picture is measured during the trainings, in tasks of the training goal that they
 had not learned from: learners of the whole task without exploring, in the same tasks each time;
 skills between rounds, in other tasks each time. A library that was made before such records had
-steps has its first and its last point alone, joined by a dotted line. The paper's figures are of a
-simulator of its own, and its trainings were longer."""
+steps has its first and its last point alone, joined by a dotted line. A method without
+a row was not run. The paper's figures are of a simulator of its own; it does not say how many steps
+its trainings had."""
 OURS = "ours"
 SAC: Mapping[tuple[str, str], float] = {  # task progress in LG-SAIL's Table 1
     ("stow_hammer", "training"): 0.15,
