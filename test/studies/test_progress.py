@@ -64,6 +64,7 @@ def test_who_holds_still_does_nothing_and_skills_do_all_stages(tmp_path, feature
     assert "sac 0.00 after 4,000 steps" in STUDIES["progress"].summary(found)
     page = (tmp_path / "out" / "progress_stack_at_target.md").read_text()
     assert "| training | sac | 2 × 2 | 4000 ± 0 | 0.00 ± 0.00 | 0%" in page
+    assert "| training | ours (manual, manual) | 1 × 2 | 18000 | " in page  # one has no spread
 
 
 def test_what_cannot_be_compared_is_left_out_with_a_reason(tmp_path, features):

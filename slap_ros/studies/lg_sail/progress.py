@@ -159,6 +159,12 @@ class LearnerProgress:
         known = {"sac": SAC, f"{OURS} (manual, manual)": LG_SAIL}.get(self.method, {})
         return known.get((self.domain, self.goal))
 
+    def _over_trainings(self, spread: Spread, digits: int) -> str:
+        """Mean ± sample standard deviation; the value alone where there is one training."""
+        if len(self.trainings) == 1:
+            return f"{spread.mean:.{digits}f}"
+        return format_spread(spread, digits)
+
     def as_json(self) -> dict[str, Any]:
         """The summary, every task and every curve."""
         return {
@@ -182,8 +188,8 @@ class LearnerProgress:
             self.goal or "(the task's own)",
             self.method,
             f"{len(self.trainings)} × {len(self.progress[0])}",
-            format_spread(self.steps, 0),
-            format_spread(self.spread, 2),
+            self._over_trainings(self.steps, 0),
+            self._over_trainings(self.spread, 2),
             str(self.solved),
             "" if self.paper is None else f"{self.paper:.2f}",
         ]
