@@ -165,8 +165,9 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["stack_at_target", "peg_in_hole", "stow_hammer"])
-def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, name):
+def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, monkeypatch, name):
     """LG-SAIL's flat baseline: one policy, which observes all objects and the goal."""
+    monkeypatch.setattr("slap_ros.baselines.progress_curve.TIMES", 1)  # of 1,000 steps each
     changes = {"n_envs": 1, "learning_starts": 16, "batch_size": 8, "validation": 1}
     domain = get_domain(name)
     trained = train_baseline(
@@ -174,6 +175,7 @@ def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, name):
     )
     assert trained.environment == {"obs": "dict", "control": "joints", "reward": "stages"}
     assert trained.record["environment_steps"] == 40
+    assert trained.record["task_progress"] == [(0, 0.0), (40, 0.0)]
     assert trained.actions == 5
     assert load_baseline(tmp_path / "x", domain).goal == "training"
 
