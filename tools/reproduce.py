@@ -25,7 +25,7 @@ from slap_ros.domains import get_domain
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.studies.reproducing import NOT_MEASURED, TRAINING_MINUTES, published
-from slap_ros.studies.slap.rivals import BASELINES
+from slap_ros.studies.trained_baselines import BASELINES
 from tools.imports import ROOT
 
 PUBLISHED = ROOT / "docs" / "results"

@@ -33,6 +33,9 @@ class MethodEntry:
 METHODS: Mapping[str, MethodEntry] = {
     "ppo": MethodEntry("ppo", "PPO of the whole task, by joint displacements alone."),
     "sac": MethodEntry("sac", "SAC of the whole task, rewarded for the stages of its plan."),
+    "curriculum": MethodEntry(
+        "curriculum", "The same SAC from near the end of demonstrations, moved back with success."
+    ),
     "sac-her": MethodEntry("sac_her", "SAC with hindsight experience replay of the whole task."),
     "hierarchical": MethodEntry(
         "hierarchical", "PPO over joint displacements and an activation for each ground skill."

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
@@ -19,9 +20,10 @@ from slap_ros.baselines.method import (
     Report,
     TaskLearner,
 )
+from slap_ros.baselines.progress_curve import ProgressCurve
 from slap_ros.baselines.trained_baseline import TrainedBaseline
 from slap_ros.baselines.training_tasks import VALIDATION
-from slap_ros.baselines.trials import try_baseline
+from slap_ros.baselines.trials import task_progress, try_baseline
 from slap_ros.environments.registration import make_task_env
 from slap_ros.environments.task_env import TaskEnv
 from slap_ros.learning.stored_keys import stored
@@ -69,11 +71,24 @@ class BaselineTraining:
         learner = self.kind.make_learner(self.settings, envs, self.distribution.seed)
         if (self.folder / CHECKPOINT).exists():
             learner.resume(self.folder)
+        curve = self._curve(learner)
         try:
-            learner.learn(_TrainingLog(self.folder, learner, report).report)
+            learner.learn(_TrainingLog(self.folder, learner, curve, report).report)
         finally:  # after Ctrl-C too
             learner.save(self.folder)
-        return self._chosen(learner)
+        return self._chosen(learner, {"task_progress": curve.points} if curve else {})
+
+    def _curve(self, learner: TaskLearner) -> ProgressCurve | None:
+        """What measures task progress now and then, where plans have stages to be rewarded for."""
+        if self.kind.environment["reward"] != "stages":
+            return None
+        curve = ProgressCurve(
+            self.folder,
+            lambda: self._on_validation_tasks(self._trained(learner), task_progress),
+            self.settings.total_steps,
+        )
+        curve.go_on(learner.progress.steps)
+        return curve
 
     @property
     def _identity(self) -> dict[str, Any]:
@@ -87,10 +102,10 @@ class BaselineTraining:
             choice.name, choice.preset, goal=self.goal, **dict(self.kind.environment)
         )
 
-    def _chosen(self, learner: TaskLearner) -> TrainedBaseline:
-        """The policy, with or without its noise: whichever does better on validation tasks."""
-        choice, progress = self.distribution.domain, learner.progress
-        trained = TrainedBaseline(
+    def _trained(self, learner: TaskLearner) -> TrainedBaseline:
+        """The policy as it is now, without its noise."""
+        choice = self.distribution.domain
+        return TrainedBaseline(
             self.method,
             choice.name,
             choice.preset,
@@ -99,6 +114,15 @@ class BaselineTraining:
             learner.policy(),
             WITHOUT_NOISE,
         )
+
+    def _chosen(self, learner: TaskLearner, measured: Mapping[str, Any]) -> TrainedBaseline:
+        """The policy, with or without its noise: whichever does better on validation tasks.
+
+        Args:
+            learner: Learner that has learned.
+            measured: Figures that were measured on the way, by name.
+        """
+        progress, trained = learner.progress, self._trained(learner)
         scales = (WITHOUT_NOISE, WITH_NOISE) if self.kind.noisy else (WITHOUT_NOISE,)
         validated = {scale: self._success(replace(trained, noise=scale)) for scale in scales}
         record = {
@@ -107,6 +131,7 @@ class BaselineTraining:
             "episodes": progress.episodes,
             **progress.figures,
             "cpu_s": round(progress.cpu_s, 1),
+            **measured,
             "validation": {f"noise {scale:g}": rate for scale, rate in validated.items()},
             "settings": stored(self.settings),
             "versions": dict(versions()),
@@ -117,18 +142,27 @@ class BaselineTraining:
 
     def _success(self, baseline: TrainedBaseline) -> float:
         """The share of validation tasks that are solved."""
+        return self._on_validation_tasks(baseline, lambda *task: float(try_baseline(*task).success))
+
+    def _on_validation_tasks(
+        self,
+        baseline: TrainedBaseline,
+        judge: Callable[[TrainedBaseline, str, str | None, int, int], float],
+    ) -> float:
+        """The mean over validation tasks of what a function gives for each."""
         seed, preset = self.distribution.task_seed, baseline.preset
         tasks = VALIDATION.batch(0, self.settings.validation)
-        return fmean(
-            try_baseline(baseline, preset, self.goal, seed, index).success for index in tasks
-        )
+        return fmean(judge(baseline, preset, self.goal, seed, index) for index in tasks)
 
 
 class _TrainingLog:
-    """Appends figures to the progress file, and saves a checkpoint now and then."""
+    """Appends figures to the progress file, measures and saves a checkpoint now and then."""
 
-    def __init__(self, folder: Path, learner: TaskLearner, report: Report) -> None:
+    def __init__(
+        self, folder: Path, learner: TaskLearner, curve: ProgressCurve | None, report: Report
+    ) -> None:
         self._folder, self._learner, self._report = folder, learner, report
+        self._curve = curve
         self._saved = monotonic()
 
     def report(self, progress: BaselineProgress) -> None:
@@ -138,4 +172,6 @@ class _TrainingLog:
         if monotonic() - self._saved > CHECKPOINT_S:
             self._learner.save(self._folder)
             self._saved = monotonic()
+        if self._curve is not None:
+            self._curve.advance(progress.steps)
         self._report(progress)

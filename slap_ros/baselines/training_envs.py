@@ -75,6 +75,22 @@ def separate_envs(make_env: MakeEnv, seed: int, count: int) -> TrainingEnvs:
     """
     envs, tally = [make_env() for _ in range(count)], TrainingTally()
     streams = [TaskStream(env, seed, number) for number, env in enumerate(envs)]
+    return stepped_apart(envs, streams, tally)
+
+
+def stepped_apart(
+    envs: Sequence[TaskEnv], streams: Sequence[TaskStream], tally: TrainingTally
+) -> TrainingEnvs:
+    """Environments that are stepped one after the other, with the tasks of these streams.
+
+    Args:
+        envs: Environments, one at least.
+        streams: Tasks of each environment.
+        tally: Counts over all environments.
+
+    Returns:
+        The environments, whose episodes have not begun.
+    """
 
     def make() -> DummyVecEnv:
         wrapped = [TrainingTasks(*pair, tally) for pair in zip(envs, streams, strict=True)]

@@ -68,21 +68,48 @@ def try_baseline(baseline: Rival, preset: str, goal: str | None, seed: int, inde
     Returns:
         The figures of the task; one that the baseline cannot observe counts as failed.
     """
+    try:
+        info = _act(baseline, preset, goal, seed, index)
+    except (InvalidStateError, InvalidCommandError) as error:
+        return _trial(seed, index, False, 0, error.code, str(error))
+    if info["success"]:
+        return _trial(seed, index, True, info["steps"], ErrorCode.NONE, "")
+    return _trial(seed, index, False, info["steps"], ErrorCode.STEP_LIMIT, OUT_OF_STEPS)
+
+
+def task_progress(baseline: Rival, preset: str, goal: str | None, seed: int, index: int) -> float:
+    """Share of the stages of a task's plan that a baseline does in order; 1 where it is solved.
+
+    Args:
+        baseline: Baseline that acts, in an environment with the reward ``stages``.
+        preset: Preset of the task.
+        goal: Goal by name or as atoms; None for the goal that comes with the task.
+        seed: Seed of the task.
+        index: Index of the task among those of its seed.
+
+    Returns:
+        The share, from 0 to 1.
+
+    Raises:
+        InvalidStateError: The baseline cannot observe the task.
+    """
+    return float(_act(baseline, preset, goal, seed, index)["progress"])
+
+
+def _act(
+    baseline: Rival, preset: str, goal: str | None, seed: int, index: int
+) -> Mapping[str, Any]:
+    """What the environment says of a task once the baseline has acted to its end."""
     env = _environment(
         baseline.domain, preset, baseline.preset, goal, tuple(baseline.environment.items())
     )
     rng = np.random.default_rng([seed, index])
-    try:
-        observation, info = env.reset(seed=seed, options={"index": index})
-        baseline.require_fit(env.observed_features, int(np.prod(env.action_space.shape or (1,))))
-        solved, cut = bool(info["success"]), False
-        while not (solved or cut):
-            observation, _, solved, cut, info = env.step(baseline.act(observation, rng))
-    except (InvalidStateError, InvalidCommandError) as error:
-        return _trial(seed, index, False, 0, error.code, str(error))
-    if solved:
-        return _trial(seed, index, True, info["steps"], ErrorCode.NONE, "")
-    return _trial(seed, index, False, info["steps"], ErrorCode.STEP_LIMIT, OUT_OF_STEPS)
+    observation, info = env.reset(seed=seed, options={"index": index})
+    baseline.require_fit(env.observed_features, int(np.prod(env.action_space.shape or (1,))))
+    solved, cut = bool(info["success"]), False
+    while not (solved or cut):
+        observation, _, solved, cut, info = env.step(baseline.act(observation, rng))
+    return info
 
 
 @lru_cache(maxsize=MOST_OPEN)

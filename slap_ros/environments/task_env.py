@@ -57,7 +57,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     at that seed and index; without a seed, the next index follows. ``options={"state": STATE}``
     begins in a state, with the domain's goal for it, and ``options={"task": TASK}`` a task.
     ``info`` has ``atoms`` and ``goal`` (names of atoms), ``success`` and ``is_success``, ``steps``,
-    and with skills ``action_mask``.
+    with stages ``progress`` (share of them that is done), and with skills ``action_mask``.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 -- Gymnasium's own
@@ -321,6 +321,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             "is_success": solved,
             "steps": episode.steps,
         }
+        if isinstance(self._reward, StagedReward):
+            info["progress"] = 1.0 if solved else self._reward.progress
         if not isinstance(self._control, JointControl):
             info["action_mask"] = self._control.mask(episode)
         return info

@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from slap_ros.environments.episode import TaskEpisode
-from slap_ros.planning.planner import make_planner
+from slap_ros.planning.problem import ground_options
+from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
@@ -95,19 +96,30 @@ class DenseReward:
 
 
 class StagedReward:
-    """The targets of a plan with given skills, one after the other; dense on the way to each."""
+    """The targets of a plan of operators, one after the other; dense on the way to each.
+
+    The plan is a shortest one, and no skill is run for it: what a learner is rewarded for does not
+    depend on how good our skills are.
+    """
 
     def begin(self, episode: TaskEpisode) -> None:
         """Make the plan whose targets are the stages.
 
         Raises:
             InvalidDomainError: The domain has no learner's interface.
+            NoSkillsError: The domain has no operators.
             UnsolvableError: The task has no plan.
         """
-        planner = make_planner("lazy", episode.domain, episode.state, None)
-        plan = planner.plan(episode.state, episode.goal).plan
-        self._targets = [edge.target for edge in plan.edges]
+        planner = SymbolicPlanner(episode.space, ground_options(episode.domain, episode.space))
+        edges = planner.edges(episode.abstract, episode.goal)
+        self._targets = [edge.target for edge in edges]
+        self._stages = len(self._targets)
         self._enter(episode)
+
+    @property
+    def progress(self) -> float:
+        """Share of the plan's stages that were done in order; 1 where there are none."""
+        return 1.0 - len(self._targets) / self._stages if self._stages else 1.0
 
     def _enter(self, episode: TaskEpisode) -> None:
         """Begin the next stage, if there is one."""

@@ -14,6 +14,7 @@ from slap_ros.studies.lg_sail import (
     imitation,
     induction,
     planning_ablation,
+    progress,
     replanning,
     retrieval,
     reward_ablation,
@@ -62,6 +63,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         vacuity.STUDY,
         acquisition.STUDY,
         replanning.STUDY,
+        progress.STUDY,
         imitation.STUDY,
         warm_start.STUDY,
         retrieval.STUDY,
@@ -77,12 +79,6 @@ STUDIES: Mapping[str, Study[Any]] = {
     )
 }
 WITHOUT_STUDY = (
-    not_made(
-        "LG-SAIL Fig. 4",
-        "learning curves beside other learners",
-        "curves",
-        "no such learner was trained in these domains",
-    ),
     not_made(
         "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was available"
     ),

@@ -130,6 +130,9 @@ def test_both_skills_are_acquired(whole):
         assert skill.record["vacuity"]["success"] <= 0.25  # of 12 steps, all within 40 mm
     assert library.record["steps"] == sum(s.record["steps"] for s in library.skills)
     assert library.record["steps"] <= WHOLE.total_steps
+    at, progress = library.record["progress_steps"], library.record["progress"]
+    assert len(at) == len(progress) and at == sorted(at)
+    assert (at[0], at[-1]) == (0, library.record["steps"])
 
 
 @pytest.mark.training

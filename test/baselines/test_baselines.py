@@ -135,10 +135,13 @@ def test_what_follows_a_long_action_is_discounted_by_its_steps():
 # -- training -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["ppo", "hierarchical", *slow("sac", "sac-her", "sol")])
+@pytest.mark.parametrize(
+    "method", ["ppo", "hierarchical", *slow("sac", "curriculum", "sac-her", "sol")]
+)
 def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     changes = {"n_envs": 2, "batch_size": 8, "validation": 1}
-    changes |= {"learning_starts": 102} if "sac" in method else {"n_steps": 16}
+    replays = method in ("sac", "curriculum", "sac-her")
+    changes |= {"learning_starts": 102} if replays else {"n_steps": 16}
 
     def stop(progress):
         if progress.steps >= 120 and not (tmp_path / "stopped").exists():
@@ -153,7 +156,7 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     assert 120 <= before < 200 <= record["environment_steps"] < 300
     with pytest.raises(InvalidParameterError, match="other settings"):
         train_baseline(method, domain, tmp_path / "x", **given, seed=1)
-    if "sac" in method:
+    if replays:
         assert np.load(tmp_path / "x-training" / REPLAY)["rewards"].size >= 100
     (tmp_path / "x-training" / "checkpoint.pt").write_bytes(b"PK damaged")
     with pytest.raises(InvalidParameterError, match=r"checkpoint\.pt: damaged"):
@@ -162,8 +165,9 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["stack_at_target", "peg_in_hole", "stow_hammer"])
-def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, name):
+def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, monkeypatch, name):
     """LG-SAIL's flat baseline: one policy, which observes all objects and the goal."""
+    monkeypatch.setattr("slap_ros.baselines.progress_curve.TIMES", 1)  # of 1,000 steps each
     changes = {"n_envs": 1, "learning_starts": 16, "batch_size": 8, "validation": 1}
     domain = get_domain(name)
     trained = train_baseline(
@@ -171,6 +175,7 @@ def test_a_bench_has_stages_that_a_learner_is_rewarded_for(tmp_path, name):
     )
     assert trained.environment == {"obs": "dict", "control": "joints", "reward": "stages"}
     assert trained.record["environment_steps"] == 40
+    assert trained.record["task_progress"] == [(0, 0.0), (40, 0.0)]
     assert trained.actions == 5
     assert load_baseline(tmp_path / "x", domain).goal == "training"
 
@@ -254,7 +259,7 @@ def test_more_objects_than_a_policy_has_room_for_count_as_failed(trained, domain
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("dreamer", "obstacle2d"), 2, "there are ppo, sac, sac-her, hierarchical, sol"),
+        (("dreamer", "obstacle2d"), 2, "there are ppo, sac, curriculum, sac-her"),
         (("ppo", "moon"), ErrorCode.UNKNOWN_DOMAIN, "moon"),
         (("ppo", "obstacle2d", "--settings", "best"), 15, "there are ours, paper"),
         (("ppo", "obstacle2d", "--set", "tau=1"), 15, "unknown setting 'tau'; there are n_envs"),
@@ -271,4 +276,4 @@ def test_what_there_is_not_is_refused(tmp_path, arguments, code, words):
 def test_methods_are_listed():
     code, said, _ = slap("baseline", "list", "--json")
     assert code == 0
-    assert list(json.loads(said)) == ["ppo", "sac", "sac-her", "hierarchical", "sol"]
+    assert list(json.loads(said)) == ["ppo", "sac", "curriculum", "sac-her", "hierarchical", "sol"]

@@ -65,3 +65,11 @@ def test_hierarchical_learning_finds_the_four_skills_of_a_task(tmp_path):
 def test_a_controller_of_options_takes_a_block(tmp_path):
     """By the skill that does it, not by one of the options, which are not learned yet."""
     assert success("sol", EASY, HOLDING, 3_000, {}, tmp_path) >= 0.5
+
+
+@pytest.mark.slow  # 1,000 updates of actor and critics
+@pytest.mark.training
+@pytest.mark.timeout(300)
+def test_sac_takes_a_block_from_near_the_end_of_demonstrations_first(tmp_path):
+    changes = {**QUICK_SAC, "learning_starts": 400}
+    assert success("curriculum", EASY, HOLDING, 2_000, changes, tmp_path) >= 0.5

@@ -77,14 +77,18 @@ def test_tasks_are_those_of_an_evaluation_and_follow_one_another(name):
     assert task.index == 6
 
 
+def names_of(env):
+    """The skills that actions run, by number."""
+    return [str(option) for _, option in env._control.options]
+
+
 def ways_to_the_goal(env):
     """Perform a plan with actions that run skills; the rewards, and the last info."""
     _, info = env.reset(seed=7)
     episode, domain = env._episode, env.domain
     planner = make_planner("lazy", domain, episode.state, None)
     plan = planner.plan(episode.state, episode.goal).plan
-    names = [str(option) for _, option in env._control.options]
-    rewards = []
+    names, rewards = names_of(env), []
     for edge in plan.edges:
         number = names.index(str(edge.option))
         assert info["action_mask"][number]
@@ -103,12 +107,17 @@ def test_a_plan_of_skills_solves_a_task_in_as_many_steps_as_predicted():
 
 def test_each_stage_of_a_plan_is_rewarded():
     env = make_task_env("obstacle2d", control="skills", reward="stages")
-    plan, rewards, _ = ways_to_the_goal(env)
+    plan, rewards, done = ways_to_the_goal(env)
     assert len(rewards) == len(plan.edges)
     assert min(rewards) > 4.0  # of each stage: 4.3 for its end, and what its potential rose by
+    assert done["progress"] == 1.0
     env.reset(seed=7)
-    _, idle, *_ = env.step(int(np.flatnonzero(~env.action_masks())[0]))
+    *_, info = env.step(names_of(env).index(str(plan.edges[0].option)))
+    assert info["progress"] == 1 / len(plan.edges)
+    env.reset(seed=7)
+    _, idle, *_, info = env.step(int(np.flatnonzero(~env.action_masks())[0]))
     assert abs(idle) < 0.1  # holding still for a step
+    assert info["progress"] == 0.0
 
 
 def test_goals_of_hindsight_have_the_rewards_of_steps():

@@ -139,6 +139,7 @@ class Curriculum:
         rollouts = self._roll_out(iteration, "rollouts", tasks, at_hand)
         require_plans(rollouts, self.source)
         state.task_progress.append(fmean(rollout.progress for rollout in rollouts))
+        state.progress_steps.append(state.steps)
         state.solved.carried_out(state.steps, rollouts)
         self.callback.on_rollouts(iteration, rollouts)
         if over := self._why_over(rollouts, state):

@@ -73,6 +73,7 @@ class CurriculumState:
     Args:
         skills: Progress of each skill by the name of its operator, in the order of the operators.
         task_progress: Task progress of the rollouts of each iteration, mean over tasks.
+        progress_steps: Environment steps that all skills had learned for by then.
         not_trained: Reasons why skills that failed in the last iteration were not trained, by
             operator.
         solved: Judgements of whole tasks.
@@ -80,6 +81,7 @@ class CurriculumState:
 
     skills: dict[str, SkillProgress]
     task_progress: list[float] = field(default_factory=list)
+    progress_steps: list[int] = field(default_factory=list)
     not_trained: dict[str, Any] = field(default_factory=dict)
     solved: SolvedShares = field(default_factory=SolvedShares)
 

@@ -69,6 +69,7 @@ def library_record(
         "ended": ended,
         "left": state.not_trained if ended == NO_PROGRESS else {},
         "progress": state.task_progress,
+        "progress_steps": state.progress_steps,
         "progress_on_fresh_tasks": fmean(rollout.progress for rollout in fresh),
         "steps": state.steps,
         "settings": settings,

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from slap_ros.api.baselines import describe_baseline, require_gymnasium
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs
 from slap_ros.api.left_out import Tell
-from slap_ros.baselines.trained_baseline import TrainedBaseline, load_baseline
-from slap_ros.core import Domain
+from slap_ros.baselines.trained_baseline import TrainedBaseline
 from slap_ros.domains import get_domain
-from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.skills.domain_choice import DomainChoice
@@ -34,6 +33,7 @@ from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval, plot_whole
 from slap_ros.studies.slap.table1 import Row, relative_cell
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
+from slap_ros.studies.trained_baselines import BASELINES, baselines_in_runs, open_baselines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,7 +46,6 @@ policy has room for counts as failed. Success has Wilson's 95 % interval, and le
 over solved tasks with the sample standard deviation. Relative length is over tasks that pure
 planning solved too. Steps are environment steps of one training, and core-hours its time of one
 core, on a machine that did other work as well."""
-BASELINES = "runs/baselines"
 
 
 @dataclass(frozen=True)
@@ -213,8 +212,8 @@ def prepare(options: RivalsOptions, tell: Tell) -> PreparedStudy:
     """
     require_gymnasium()
     domain = get_domain(options.domain)
-    folders = options.against or _trained(options.domain)
-    baselines = _opened(folders, domain, tell)
+    folders = options.against or baselines_in_runs(options.domain)
+    baselines = open_baselines(folders, domain, _why_not, tell)
     if not baselines:
         raise InvalidParameterError(
             f"there is no baseline of {options.domain} to compare with; `slap baseline train "
@@ -233,25 +232,9 @@ def prepare(options: RivalsOptions, tell: Tell) -> PreparedStudy:
     )
 
 
-def _opened(folders: Sequence[Path], domain: Domain, tell: Tell) -> dict[str, TrainedBaseline]:
-    """The baselines that can be used, by the names of their folders."""
-    found: dict[str, TrainedBaseline] = {}
-    for folder in folders:
-        try:
-            baseline = load_baseline(folder, domain)
-        except InvalidLibraryError as error:
-            tell(f"a baseline is left out: {error}")
-            continue
-        if baseline.goal is not None:
-            tell(f"a baseline is left out: {folder}: trained for another goal, {baseline.goal}")
-            continue
-        found[folder.resolve().name] = baseline
-    return found
-
-
-def _trained(domain: str) -> list[Path]:
-    """The baselines of a domain in the folder in which they are by default."""
-    return sorted(path.parent for path in Path(BASELINES).glob(f"{domain}-*/baseline.json"))
+def _why_not(baseline: TrainedBaseline) -> str:
+    """Why a baseline cannot be compared; empty where it can."""
+    return "" if baseline.goal is None else f"trained for another goal, {baseline.goal}"
 
 
 STUDY = Study(
