@@ -526,7 +526,7 @@ def test_a_plan_that_fails_in_the_model_is_no_plan_to_shorten(hasty):
     assert not planned.success and "Put" in planned.reason
 
 
-@pytest.mark.parametrize("name", ["join", "grown", "grown/seed1"])
+@pytest.mark.parametrize("name", ["join", "grown", "grown/seed1", "grown/seed2"])
 def test_libraries_that_ship_together_are_those_that_were_evaluated(name):
     folder = Path(__file__).parents[2] / "models" / name
     bench = open_domain(DomainChoice("stack_at_target", "fair:blocked=1", str(folder / "skills")))
