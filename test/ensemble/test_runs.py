@@ -178,7 +178,7 @@ def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
         ("hidden=block9", "block9 cannot be hidden"),
         ("noise_seed=-1", "noise_seed is -1; it must be from 0"),
         ("acuity=6", "perception has no parameter"),
-        ("dropout=often", "dropout is a number"),
+        ("dropout=often", "dropout must be a number"),
     ],
 )
 def test_perception_that_cannot_be_is_refused_before_anything_starts(perception, words):
