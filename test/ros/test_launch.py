@@ -48,7 +48,7 @@ def test_a_parameter_file_goes_before_defaults_and_arguments_before_the_file(cli
         ("params_file:=nowhere.yaml", "nowhere.yaml"),
         ("world:=moon", "moon"),
         ("camera:=perhaps", "perhaps"),
-        ("seed:=x", "seed is a number"),
+        ("seed:=x", "seed must be a whole number"),
     ],
 )
 def test_a_wrong_argument_starts_nothing(cli, argument, words):
