@@ -174,7 +174,7 @@ def _value(name: str, text: str) -> ParameterValue:
     try:
         return ParameterValue(kind(text), value_type=kind)
     except ValueError:
-        raise InvalidParameterError(f"{name} is a number, not {text!r}") from None
+        raise InvalidParameterError(f"{name} must be a whole number, not {text!r}") from None
 
 
 def _parameter_files(given: Mapping[str, str]) -> list[str]:
