@@ -174,7 +174,8 @@ def _value(name: str, text: str) -> ParameterValue:
     try:
         return ParameterValue(kind(text), value_type=kind)
     except ValueError:
-        raise InvalidParameterError(f"{name} must be a whole number, not {text!r}") from None
+        wanted = "a whole number" if kind is int else "a number"
+        raise InvalidParameterError(f"{name} must be {wanted}, not {text!r}") from None
 
 
 def _parameter_files(given: Mapping[str, str]) -> list[str]:
