@@ -52,6 +52,7 @@ from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MUJOCO, SIM
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.skills.domain_choice import DomainChoice
+from slap_ros.skills.skill import approach_of
 from slap_ros.vision.installed import require_camera_libraries
 
 LOOK_S = 0.05  # s, between two looks at whether somebody watches
@@ -226,9 +227,6 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
         SlapError: It is no goal of the task; or planner, library or pictures are not there.
     """
     if options.grow:
-        # What is made of acquired skills takes a fifth of this command's imports.
-        from slap_ros.skills.skill import approach_of
-
         approach_of(domain)
     elif options.shortcuts == GROWN:
         raise InvalidParameterError("shortcuts that are grown need --grow, which grows them")

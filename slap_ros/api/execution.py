@@ -14,12 +14,12 @@ from slap_ros.api.video import write_video
 from slap_ros.bags.run_recording import record_run
 from slap_ros.core import Action, Domain, PictureSize, Task
 from slap_ros.core.notebook import ShownInNotebooks
-from slap_ros.errors import InvalidParameterError
 from slap_ros.planning.execution import MAX_REPLANS, EpisodeResult, ExecutedEdge, Executor
 from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import State
 from slap_ros.report import BagReport, read_report
+from slap_ros.whole_numbers import require_whole
 
 
 @dataclass(frozen=True)
@@ -142,12 +142,11 @@ def execute(
         The run. A task that is not solved is no error: ``run.success`` and ``run.error`` say so.
 
     Raises:
-        InvalidParameterError: ``max_replans`` is negative.
+        InvalidParameterError: ``max_replans`` is negative or no whole number.
         NoSkillsError: The domain has no skills yet.
         InvalidLibraryError: Without a plan: the library that ships cannot be used.
     """
-    if max_replans < 0:
-        raise InvalidParameterError(f"max_replans is {max_replans}; it must not be negative")
+    require_whole("max_replans", max_replans)
     first = plan if not isinstance(plan, Plan) else PlanningResult(plan, 0, 0, 0)
     space = domain.atom_space(task.initial_state)
     planner = first.planner if first is not None else planner_for(domain, task)
