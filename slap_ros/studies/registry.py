@@ -10,6 +10,7 @@ from typing import Any
 
 from slap_ros.studies.lg_sail import (
     acquisition,
+    acquisition_ablation,
     demonstrations,
     imitation,
     induction,
@@ -66,6 +67,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         progress.STUDY,
         imitation.STUDY,
         warm_start.STUDY,
+        acquisition_ablation.STUDY,
         retrieval.STUDY,
         sequence.STUDY,
         induction.STUDY,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
+from slap_ros.acquisition.curriculum.jobs import horizon_of
 from slap_ros.acquisition.curriculum.solved_shares import Point
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.settings import AcquisitionSettings
@@ -33,6 +34,18 @@ class AcquisitionSetup:
     preset: str
     goal: str
     settings: AcquisitionSettings
+
+    def source(self, seed: int) -> TaskSource:
+        """The tasks of a training, with the operators and rewards that people wrote.
+
+        Args:
+            seed: Seed of the training.
+        """
+        domain = acquirable(self.domain, self.preset)
+        assert domain.acquisition is not None
+        return TaskSource.of(
+            domain, self.goal, seed, domain.acquisition.operators, domain.acquisition.rewards
+        )
 
 
 @dataclass(frozen=True)
@@ -74,10 +87,10 @@ class LearningCurves:
 def learn_skills(
     setup: AcquisitionSetup, seed: int, known: Sequence[str], folder: str
 ) -> dict[str, Any]:
-    """Acquire the skills of a domain for its hand-written operators and rewards.
+    """Acquire the skills of a domain.
 
     Args:
-        setup: Domain, goal and settings of the training.
+        setup: Domain, goal and settings of the training; its operators and rewards.
         seed: Seed of all random numbers.
         known: Folders of libraries whose skills new ones may begin with.
         folder: Folder for checkpoints, from which an interrupted training goes on.
@@ -85,12 +98,8 @@ def learn_skills(
     Returns:
         The :class:`LearningCurves` as JSON.
     """
-    domain = acquirable(setup.domain, setup.preset)
-    assert domain.acquisition is not None
-    source = TaskSource.of(
-        domain, setup.goal, seed, domain.acquisition.operators, domain.acquisition.rewards
-    )
-    segment_steps = setup.settings.segment_steps(domain.acquisition.horizon)
+    source = setup.source(seed)
+    segment_steps = setup.settings.segment_steps(horizon_of(source.make_domain()))
     callback = CurveCallback(UnwatchedCurriculum(), segment_steps)
     skills = known_skills([Path(path) for path in known], lambda _: None)
     workers = SequentialWorkers()
