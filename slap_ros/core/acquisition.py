@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from slap_ros.core.skill import Policy
+from slap_ros.geometry.pose import Vector
 from slap_ros.relational import LiftedOperator, Object, RewardTemplate, State
+from slap_ros.relational.state import Array
 
 # (state, an operator's objects) to what brings the hand to where its skill begins: 0.04 m from
 # the object or placement that the last of the objects names (LG-SAIL §5.1). The policy gives None
@@ -18,6 +20,30 @@ Approach = Callable[[State, tuple[Object, ...]], Policy]
 # (state, an operator's objects) to a closed loop that does what the operator says, knowing all of
 # the state. It shows that a task can be solved; no plan ever uses it as a skill.
 Script = Callable[[State, tuple[Object, ...]], Policy]
+
+# (state, parameters) to a closed loop that ends by itself and knows nothing of objects.
+Primitive = Callable[[State, Array], Policy]
+
+
+@dataclass(frozen=True)
+class Primitives:
+    """Movements with parameters, which some learners of whole tasks choose from instead of skills.
+
+    All have the same parameters, the first three of which are a position in the base's frame, m. A
+    learner says where it is relative to what the plan's present operator acts on.
+
+    Args:
+        policies: Movements by name.
+        low: Least value of each parameter, shape (parameters,).
+        high: Largest value of each parameter, shape (parameters,).
+        target_of: Function from a state and an operator's objects to the position of the one that
+            is acted on, m.
+    """
+
+    policies: Mapping[str, Primitive]
+    low: Array
+    high: Array
+    target_of: Callable[[State, tuple[Object, ...]], Vector]
 
 
 @dataclass(frozen=True)
@@ -30,6 +56,7 @@ class Acquisition:
         rewards: Written by hand, by operator name.
         scripts: Scripts of the demonstrator, by operator name.
         horizon: Environment steps of a skill, approach not counted.
+        primitives: Movements with parameters, for learners that choose from these; None for none.
     """
 
     approach: Approach
@@ -37,3 +64,4 @@ class Acquisition:
     rewards: Mapping[str, RewardTemplate] = field(default_factory=dict)
     scripts: Mapping[str, Script] = field(default_factory=dict)
     horizon: int = 50
+    primitives: Primitives | None = None

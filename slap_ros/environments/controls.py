@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What an action of a learner does: move the joints, run a skill, or one of both."""
+"""What an action of a learner does: move the joints, run a skill or a primitive, or either."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from slap_ros.core import Action, Domain, World
+from slap_ros.core.acquisition import Primitive
 from slap_ros.environments.episode import TaskEpisode
-from slap_ros.errors import InvalidCommandError, SkillNotApplicableError
+from slap_ros.errors import InvalidCommandError, NoSkillsError, SkillNotApplicableError
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
 from slap_ros.planning.problem import GroundedOptions, ground_options
 from slap_ros.policies.action_map import ActionMap
+from slap_ros.portable_math import on_grid
 from slap_ros.relational import AtomSpace, State, Target
+from slap_ros.relational.state import Array
 
 ACTIVE = 0.5  # activation from which on a skill is run
 
@@ -115,6 +118,66 @@ class MixedControl:
     def mask(self, episode: TaskEpisode) -> NDArray[np.bool_]:
         """See :meth:`SkillControl.mask`."""
         return self.skills.mask(episode)
+
+
+class PrimitiveControl:
+    """A score for one step of the joints and for each primitive: what has the highest is done.
+
+    An action has the scores, then the primitives' parameters, then the joints' axes. Positions are
+    relative to what the present operator of the task's plan acts on.
+    """
+
+    def __init__(self, domain: Domain) -> None:
+        """Find the primitives.
+
+        Args:
+            domain: Domain that has them.
+
+        Raises:
+            NoSkillsError: It has none.
+        """
+        if domain.acquisition is None or domain.acquisition.primitives is None:
+            raise NoSkillsError(
+                f"domain {domain.name} has no primitives for control='primitives'; those at the "
+                "benches have"
+            )
+        self.primitives = domain.acquisition.primitives
+        self.joints = JointControl(domain)
+        (axes,) = self.joints.space.shape
+        self._scores = 1 + len(self.primitives.policies)
+        size = self._scores + len(self.primitives.low) + int(axes)
+        self.space = spaces.Box(-1.0, 1.0, (size,), np.float32)
+
+    def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
+        """See :class:`Control`."""
+        given = np.clip(checked(action, self.space), -1.0, 1.0)
+        scores, rest = np.split(given, [self._scores])
+        told, axes = np.split(rest, [len(self.primitives.low)])
+        chosen = int(scores.argmax())
+        if chosen == 0 or not episode.stage:  # without a plan there is nothing to aim at
+            yield from self.joints.act(axes, episode, world)
+            return
+        primitive = list(self.primitives.policies.values())[chosen - 1]
+        yield from self._run(primitive, self._parameters(told, episode), episode, world)
+
+    def _parameters(self, told: Action, episode: TaskEpisode) -> Array:
+        """The parameters of a primitive, from numbers between -1 and 1."""
+        low, high = self.primitives.low, self.primitives.high
+        parameters = low + 0.5 * (told + 1.0) * (high - low)
+        parameters[:3] += self.primitives.target_of(episode.state, episode.stage)
+        return on_grid(parameters)
+
+    def _run(
+        self, primitive: Primitive, parameters: Array, episode: TaskEpisode, world: World
+    ) -> Iterator[State]:
+        """Run a primitive to its end; hold still for a step where it has nothing to do."""
+        policy = primitive(episode.state, parameters)
+        command = policy(episode.state)
+        if command is None:
+            yield world.step(episode.domain.action_space.hold)
+        while command is not None:
+            yield world.step(command)
+            command = policy(episode.state)
 
 
 def checked(action: Any, space: spaces.Box) -> Action:

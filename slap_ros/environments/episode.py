@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from slap_ros.core import Domain, Task
-from slap_ros.relational import AtomSpace, State
+from slap_ros.relational import AtomSpace, Object, State
 
 
 @dataclass
@@ -22,6 +22,7 @@ class TaskEpisode:
         goal: Mask of the atoms that must hold.
         state: Newest state.
         steps: Environment steps so far.
+        stage: Objects of the present operator of the task's plan, where a reward follows one.
     """
 
     domain: Domain
@@ -30,6 +31,7 @@ class TaskEpisode:
     goal: int
     state: State
     steps: int = 0
+    stage: tuple[Object, ...] = ()
     _abstracted: tuple[State, int] | None = field(default=None, init=False, repr=False)
     _named: tuple[int, tuple[str, ...]] | None = field(default=None, init=False, repr=False)
 

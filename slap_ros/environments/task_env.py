@@ -25,7 +25,12 @@ from numpy.typing import NDArray
 
 from slap_ros.core import Domain, PictureSize, Task, World, task_with_goal
 from slap_ros.drawing.body_pictures import canvas_of, draw_bodies, viewpoint, visible
-from slap_ros.environments.controls import JointControl, MixedControl, SkillControl
+from slap_ros.environments.controls import (
+    JointControl,
+    MixedControl,
+    PrimitiveControl,
+    SkillControl,
+)
 from slap_ros.environments.episode import TaskEpisode
 from slap_ros.environments.observations import (
     FeatureObservation,
@@ -46,7 +51,7 @@ REWARDS: Mapping[str, type[SparseReward | DenseReward | StagedReward]] = {
     "stages": StagedReward,
 }
 OBSERVATIONS = ("state", "view")
-CONTROLS = ("joints", "skills", "both")
+CONTROLS = ("joints", "skills", "both", "primitives")
 PICTURE = PictureSize(480, 360)  # pixels
 
 
@@ -84,8 +89,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             obs: Observation: ``state`` (features of all objects) or ``view`` (what shortcuts see).
             reward: Reward: ``sparse`` (-1 a step), ``dense`` (the potential that shortcuts get on
                 the way to the goal) or ``stages`` (on the way to each state of a plan).
-            control: Actions: ``joints``, ``skills`` (a number for each ground skill) or ``both``
-                (joints and an activation of each skill).
+            control: Actions: ``joints``, ``skills`` (a number for each ground skill), ``both``
+                (joints and an activation of each skill) or ``primitives`` (a score for each
+                movement of the domain's, and their parameters; only with ``stages``).
             goal: Goal of every task, by name or as atoms; None for each task's own.
             like: Preset whose tasks say for how many objects observations have room, and how
                 features are scaled; None for the environment's own.
@@ -100,8 +106,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             UnknownGoalError: There is no goal of that name.
         """
         _require("obs", obs, OBSERVATIONS)
-        _require("reward", reward, tuple(REWARDS))
-        _require("control", control, CONTROLS)
+        _require_control(control, reward)
         if render_mode is not None:
             _require("render_mode", render_mode, self.metadata["render_modes"])
         chosen = DomainChoice(domain, preset, "" if skills == "shipped" else skills)
@@ -197,8 +202,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         Raises:
             InvalidParameterError: Actions run no skills, or no episode has begun.
         """
-        if isinstance(self._control, JointControl):
-            raise InvalidParameterError("control='joints' has no skills, so there is no mask")
+        if not isinstance(self._control, (SkillControl, MixedControl)):
+            raise InvalidParameterError("joints and primitives run no skills, so there is no mask")
         return self._control.mask(self._under_way)
 
     # -- making it --------------------------------------------------------------------------------
@@ -213,9 +218,13 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         most = max(range(CENSUS), key=lambda i: len(atoms[i].layout.objects))
         return ViewObservation(self.domain, self._slots, atoms[most], states[most])
 
-    def _make_control(self, name: str) -> JointControl | SkillControl | MixedControl:
+    def _make_control(
+        self, name: str
+    ) -> JointControl | PrimitiveControl | SkillControl | MixedControl:
         if name == "joints":
             return JointControl(self.domain)
+        if name == "primitives":
+            return PrimitiveControl(self.domain)
         made = SkillControl if name == "skills" else MixedControl
         return made(self.domain, self._first)
 
@@ -225,7 +234,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     @property
     def _needs_same_objects(self) -> bool:
         """Whether goals or actions are numbered over the objects of the first task."""
-        return not isinstance(self._control, JointControl)
+        return isinstance(self._control, (SkillControl, MixedControl))
 
     # -- an episode -------------------------------------------------------------------------------
 
@@ -323,7 +332,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         }
         if isinstance(self._reward, StagedReward):
             info["progress"] = 1.0 if solved else self._reward.progress
-        if not isinstance(self._control, JointControl):
+        if isinstance(self._control, (SkillControl, MixedControl)):
             info["action_mask"] = self._control.mask(episode)
         return info
 
@@ -336,3 +345,11 @@ def _require(what: str, name: str, known: tuple[str, ...] | list[str]) -> None:
     """
     if name not in known:
         raise InvalidParameterError(f"unknown {what} {name!r}; there are {', '.join(known)}")
+
+
+def _require_control(control: str, reward: str) -> None:
+    """Refuse actions or a reward that are not known, or do not go together."""
+    _require("reward", reward, tuple(REWARDS))
+    _require("control", control, CONTROLS)
+    if control == "primitives":
+        _require("reward for control='primitives'", reward, ("stages",))

@@ -113,6 +113,7 @@ class StagedReward:
         planner = SymbolicPlanner(episode.space, ground_options(episode.domain, episode.space))
         edges = planner.edges(episode.abstract, episode.goal)
         self._targets = [edge.target for edge in edges]
+        self._objects = [edge.option.objects for edge in edges]
         self._stages = len(self._targets)
         self._enter(episode)
 
@@ -125,6 +126,7 @@ class StagedReward:
         """Begin the next stage, if there is one."""
         self._potential: PotentialReward | None = None
         if self._targets:
+            episode.stage = self._objects[-len(self._targets)]
             now, then = episode.abstract, self._targets[0].required
             self._potential = PotentialReward(episode, Change.between(now, then))
 

@@ -53,6 +53,7 @@ def test_names_are_registered_and_nothing_else_is_imported():
         {"domain": "obstacle2d", "obs": "view", "reward": "stages"},
         {"domain": "obstacle2d", "obs": "dict", "control": "both"},
         {"domain": "stack_at_target", "control": "skills"},
+        {"domain": "stack_at_target", "control": "primitives", "reward": "stages"},
         *slow({"domain": "obstacle_tower", "preset": "fair", "reward": "dense"}),
         *slow(*({"domain": name} for name in sorted(set(TASKS.values())))),
     ],

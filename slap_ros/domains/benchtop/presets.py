@@ -14,6 +14,7 @@ import numpy as np
 from slap_ros.core import Acquisition, Domain, Execution, Goal, Learning, Task
 from slap_ros.domains.benchtop.learner_interface import learner_interface
 from slap_ros.domains.benchtop.metrics import COMMON
+from slap_ros.domains.benchtop.primitives import PRIMITIVES
 from slap_ros.domains.benchtop.visualization import VIEW, display
 from slap_ros.relational import Layout, Metric, Predicate, State, Type
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
@@ -122,7 +123,7 @@ def benchtop_domain(
             interface=learner_interface(model.holding, scene_of),
             settings={"ours_near": NEAR_SETTINGS},
         ),
-        acquisition=model.acquisition,
+        acquisition=replace(model.acquisition, primitives=PRIMITIVES),
         configuration=settings.as_configuration(),
     )
 
