@@ -4,20 +4,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
 from slap_ros.environments.episode import TaskEpisode
+from slap_ros.planning.plan import PlanEdge
 from slap_ros.planning.problem import ground_options
 from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.policies.learner_interface import learner_interface
-from slap_ros.relational import State
+from slap_ros.relational import Column, LiftedOperator, Object, RewardTemplate, State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.signature import Change, Signature
 
 REWARDS = Rewards()  # as shortcuts are learned with
+STAGE = REWARDS.scale * REWARDS.success  # for the end of a stage
 
 
 class TaskReward(Protocol):
@@ -73,6 +76,47 @@ class PotentialReward:
         return float(REWARDS.of(np.array([gain]), success, failure)[0])
 
 
+class MetricReward:
+    """The gain of the weighted metrics that people wrote for a skill (LG-SAIL Eq. 3), and its end.
+
+    In all, a stage is worth :data:`STAGE` for its metrics, and as much for its end.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        operator: LiftedOperator,
+        objects: Sequence[Object],
+        template: RewardTemplate,
+    ) -> None:
+        """Begin in a state.
+
+        Args:
+            state: State in which the stage begins.
+            operator: Operator of the stage.
+            objects: Objects that it is applied to.
+            template: Dense part of the operator's reward.
+        """
+        own = dict(zip(operator.parameters, objects, strict=True))
+        self._terms = [
+            (term, [Column((own[variable],)) for variable in term.arguments])
+            for term in template.terms
+        ]
+        self._before = self._value(state)
+
+    def _value(self, state: State) -> float:
+        return sum(
+            term.weight * float(term.metric.normalised(state, *columns).reshape(-1)[0])
+            for term, columns in self._terms
+        )
+
+    def of(self, state: State, reached: bool) -> float:
+        """See :meth:`PotentialReward.of`."""
+        value = 1.0 if reached else self._value(state)
+        gain, self._before = value - self._before, value
+        return STAGE * (gain + reached)
+
+
 class DenseReward:
     """The gain of the potential on the way to the goal, as if it were a shortcut's target."""
 
@@ -98,8 +142,9 @@ class DenseReward:
 class StagedReward:
     """The targets of a plan of operators, one after the other; dense on the way to each.
 
-    The plan is a shortest one, and no skill is run for it: what a learner is rewarded for does not
-    depend on how good our skills are.
+    Where people wrote rewards for skills, as at the benches, these are the dense part; elsewhere
+    it is the potential that shortcuts get. The plan is a shortest one, and no skill is run for it:
+    what a learner is rewarded for does not depend on how good our skills are.
     """
 
     def begin(self, episode: TaskEpisode) -> None:
@@ -112,31 +157,48 @@ class StagedReward:
         """
         planner = SymbolicPlanner(episode.space, ground_options(episode.domain, episode.space))
         edges = planner.edges(episode.abstract, episode.goal)
-        self._targets = [edge.target for edge in edges]
-        self._objects = [edge.option.objects for edge in edges]
-        self._stages = len(self._targets)
+        self._edges = list(edges)
+        self._stages = len(edges)
         self._enter(episode)
 
     @property
     def progress(self) -> float:
         """Share of the plan's stages that were done in order; 1 where there are none."""
-        return 1.0 - len(self._targets) / self._stages if self._stages else 1.0
+        return 1.0 - len(self._edges) / self._stages if self._stages else 1.0
 
     def _enter(self, episode: TaskEpisode) -> None:
         """Begin the next stage, if there is one."""
-        self._potential: PotentialReward | None = None
-        if self._targets:
-            episode.stage = self._objects[-len(self._targets)]
-            now, then = episode.abstract, self._targets[0].required
-            self._potential = PotentialReward(episode, Change.between(now, then))
+        self._dense: PotentialReward | MetricReward | None = None
+        if self._edges:
+            episode.stage = self._edges[0].option.objects
+            self._dense = _dense_reward(episode, self._edges[0])
 
     def of(self, episode: TaskEpisode) -> float:
         """See the class."""
-        if self._potential is None:
+        if self._dense is None:
             return 0.0
-        reached = self._targets[0].reached(episode.abstract)
-        reward = self._potential.of(episode.state, reached)
+        reached = self._edges[0].target.reached(episode.abstract)
+        reward = self._dense.of(episode.state, reached)
         if reached:
-            del self._targets[0]
+            del self._edges[0]
             self._enter(episode)
         return reward
+
+
+def _dense_reward(episode: TaskEpisode, edge: PlanEdge) -> PotentialReward | MetricReward:
+    """What is paid on the way to the end of a plan's first edge, from the newest state."""
+    name, objects = edge.option.skill.name, edge.option.objects
+    written = episode.domain.acquisition
+    for operator in written.operators if written else ():
+        if written and operator.name == name and _fits(operator, objects):
+            return MetricReward(episode.state, operator, objects, written.rewards[name])
+    change = Change.between(episode.abstract, edge.target.required)
+    return PotentialReward(episode, change)
+
+
+def _fits(operator: LiftedOperator, objects: Sequence[Object]) -> bool:
+    """Whether an operator can be applied to objects: one of another author may have others."""
+    parameters = operator.parameters
+    return len(parameters) == len(objects) and all(
+        one.type.is_a(variable.type) for one, variable in zip(objects, parameters, strict=True)
+    )

@@ -13,10 +13,14 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from slap_ros.acquisition.training.skill_env import SkillMdp
+from slap_ros.baselines.reverse_curriculum import demonstrated_tasks
 from slap_ros.domains import get_domain
+from slap_ros.environments.episode import TaskEpisode
 from slap_ros.environments.observations import ViewObservation
 from slap_ros.environments.registration import TASKS, make_task_env
 from slap_ros.environments.slots import ObjectSlots
+from slap_ros.environments.task_rewards import STAGE, StagedReward
 from slap_ros.errors import (
     InvalidCommandError,
     InvalidDomainError,
@@ -24,6 +28,9 @@ from slap_ros.errors import (
     InvalidStateError,
 )
 from slap_ros.planning.planner import make_planner
+from slap_ros.policies.learner_interface import learner_interface
+from slap_ros.skills.groundings import Grounding, Groundings
+from slap_ros.skills.reward import SkillReward
 from support.marks import slow
 
 ROOT = Path(__file__).parents[2]
@@ -119,6 +126,36 @@ def test_each_stage_of_a_plan_is_rewarded():
     _, idle, *_, info = env.step(int(np.flatnonzero(~env.action_masks())[0]))
     assert abs(idle) < 0.1  # holding still for a step
     assert info["progress"] == 0.0
+
+
+def as_skills_are_paid(domain, name, state, objects):
+    """The dense part of a skill's reward in a state."""
+    (operator,) = (one for one in domain.acquisition.operators if one.name == name)
+    reward = SkillReward(operator, domain.acquisition.rewards[name], learner_interface(domain))
+    mdp = SkillMdp(domain, reward, Groundings([Grounding(state.layout, objects)]))
+    rows = np.array(state.data)[None]
+    rewards, success = mdp.rewards(rows, np.zeros(1, dtype=int), rows)
+    assert not success.any()
+    return rewards[0]
+
+
+def test_a_stage_at_a_bench_is_worth_its_metrics_and_as_much_again_at_its_end():
+    """The metrics are those of the hand-written rewards, which skills are acquired with."""
+    env = make_task_env("stack_at_target", "fair", reward="stages", goal="training")
+    shown = demonstrated_tasks(env, 1_000_000, 1)[0]
+    episode = TaskEpisode.of(env.domain, shown.task)
+    reward = StagedReward()
+    reward.begin(episode)
+    objects, rewards = episode.stage, []
+    for state in shown.states[1:]:
+        if state is not None and reward.progress == 0.0:
+            episode.state = state
+            rewards.append(reward.of(episode))
+    assert reward.progress == 0.25
+    first = as_skills_are_paid(env.domain, "Pick", shown.task.initial_state, objects)
+    assert sum(rewards) == pytest.approx(STAGE * (1.0 - first) + STAGE)
+    assert sum(one > 0.0 for one in rewards) > 20  # on the way as well, from the first steps on
+    assert rewards[0] > 0.0
 
 
 def test_goals_of_hindsight_have_the_rewards_of_steps():
