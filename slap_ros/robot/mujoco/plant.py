@@ -21,6 +21,7 @@ from slap_ros.robot.mujoco.arm import (
     ARM_JOINTS,
     FINGER_FORCE,
     FINGER_JOINTS,
+    FINGER_SPEED,
     LARGEST_FINGER_FORCE,
     PERIOD_S,
 )
@@ -124,19 +125,29 @@ class MujocoPlant:
         self._data.ctrl[:JOINTS] = joints
 
     def command_fingers(self, finger: float, force: float = FINGER_FORCE) -> None:
-        """Have the fingers move from now on.
+        """Have the fingers move from now on, no faster than a real gripper's.
 
         Args:
             finger: Distance of each finger from the middle, m.
             force: Largest force of each finger, N.
         """
         limit = min(force, LARGEST_FINGER_FORCE)
-        self._data.ctrl[JOINTS:] = finger
+        self._fingers_to = finger
+        # Fingers that open do so from where they are, and let go of what they press at once.
+        at = np.minimum(self._data.qpos[self._fingers_at], finger)
+        self._data.ctrl[JOINTS:] = np.maximum(self._data.ctrl[JOINTS:], at)
         self._model.actuator_forcerange[JOINTS:] = (-limit, limit)
 
     def step(self) -> None:
         """Let a period pass."""
+        self._command_fingers_on()
         mujoco.mj_step(self._model, self._data)
+
+    def _command_fingers_on(self) -> None:
+        """Move the fingers' command towards where they are to go, by a period's way."""
+        at = self._data.ctrl[JOINTS:]
+        way = FINGER_SPEED * PERIOD_S
+        at += np.clip(self._fingers_to - at, -way, way)
 
     # -- all of it ------------------------------------------------------------------------------
 
