@@ -4,8 +4,10 @@
 
 A block that was pushed or dropped may lie where no operator knows it: half on a target, say, on
 which there is then no room, though it is not on it. To pick it up makes room, and only the model
-knows that. So options are tried out in the model, until one ends in an abstract state that its
-operator does not predict, and from which operators lead to the goal.
+knows that. A robot may also stop on the way of a skill, in an abstract state in which no skill
+begins: what it holds is off the table, say, and not yet above everything. So options are tried out
+in the model, until one ends in an abstract state from which operators lead to the goal, though no
+operator leads there.
 """
 
 from __future__ import annotations
@@ -23,14 +25,14 @@ from slap_ros.planning.options import Option
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.recovery import SearchTo
-from slap_ros.relational import State, Target
+from slap_ros.relational import GroundOperator, State, Target
 
 MOST_ROLLOUTS = 80  # of options that are tried
 
 
 @dataclass(frozen=True)
 class UnforeseenSearch:
-    """Looks for an option that changes more than its operator says, breadth first.
+    """Looks for an option that does more than its operator says, breadth first.
 
     Args:
         problem: The model, and the ground operators with their options.
@@ -51,7 +53,7 @@ class UnforeseenSearch:
         if self._may_lead_on(self.problem.model.space.abstract(state)):
             return None  # nothing is missing: atoms of the goal never hold together
         for start, before, option, rollout in self._tried(state):
-            if rollout.reached or not self._may_lead_on(rollout.abstract):
+            if not self._may_lead_on(rollout.abstract):
                 continue
             aside = Target.exactly(rollout.abstract)
             ended = self.problem.model.roll_out(option, start, aside)
@@ -76,8 +78,8 @@ class UnforeseenSearch:
         while queue:
             here, before = queue.popleft()
             abstract = model.space.abstract(here)
-            for ground, option in self.problem.operators:
-                if option in moved or not ground.applicable(abstract):
+            for ground, option in self._startable(abstract):
+                if option in moved:
                     continue
                 if not left:
                     return
@@ -91,6 +93,29 @@ class UnforeseenSearch:
                     seen.add(rollout.abstract)
                     edge = PlanEdge(option, target, rollout.steps)
                     queue.append((rollout.final, (*before, edge)))
+
+    def _startable(self, abstract: int) -> list[tuple[GroundOperator, Option]]:
+        """The options that may start: nothing is missing, or only what they delete themselves.
+
+        A skill that was stopped has deleted a part of it already.
+
+        Args:
+            abstract: Abstract state to start from.
+
+        Returns:
+            The options with their operators, those first for which the least is missing.
+        """
+        missing = {
+            number: ground.preconditions & ~abstract
+            for number, (ground, _) in enumerate(self.problem.operators)
+        }
+        able = [
+            number
+            for number, (ground, _) in enumerate(self.problem.operators)
+            if not missing[number] & ~ground.delete_effects
+        ]
+        able.sort(key=lambda number: missing[number].bit_count())
+        return [self.problem.operators[number] for number in able]
 
     def _may_lead_on(self, abstract: int) -> bool:
         """Whether each atom of the goal can be reached, as far as operators say."""
