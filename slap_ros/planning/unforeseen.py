@@ -13,7 +13,7 @@ operator leads there.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -26,6 +26,9 @@ from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.recovery import SearchTo
 from slap_ros.relational import GroundOperator, State, Target
+
+# Which options are tried in an abstract state, a mask, in order.
+Candidates = Callable[[int], Sequence[tuple[GroundOperator, Option]]]
 
 MOST_ROLLOUTS = 80  # of options that are tried
 
@@ -52,7 +55,10 @@ class UnforeseenSearch:
         """
         if self._may_lead_on(self.problem.model.space.abstract(state)):
             return None  # nothing is missing: atoms of the goal never hold together
-        for start, before, option, rollout in self._tried(state):
+        return self._plan_past(state, self._applicable) or self._plan_past(state, self._startable)
+
+    def _plan_past(self, state: State, candidates: Candidates) -> tuple[Plan, AbstractGraph] | None:
+        for start, before, option, rollout in self._tried(state, candidates):
             if not self._may_lead_on(rollout.abstract):
                 continue
             aside = Target.exactly(rollout.abstract)
@@ -66,7 +72,9 @@ class UnforeseenSearch:
                     return Plan((*before, edge, *outcome.plan.edges)), graph
         return None
 
-    def _tried(self, state: State) -> Iterator[tuple[State, tuple[PlanEdge, ...], Option, Rollout]]:
+    def _tried(
+        self, state: State, candidates: Candidates
+    ) -> Iterator[tuple[State, tuple[PlanEdge, ...], Option, Rollout]]:
         """Options as they end in the model, each with the state that it starts in and the way.
 
         One that has moved the robot is not tried again from another state.
@@ -78,7 +86,7 @@ class UnforeseenSearch:
         while queue:
             here, before = queue.popleft()
             abstract = model.space.abstract(here)
-            for ground, option in self._startable(abstract):
+            for ground, option in candidates(abstract):
                 if option in moved:
                     continue
                 if not left:
@@ -94,28 +102,20 @@ class UnforeseenSearch:
                     edge = PlanEdge(option, target, rollout.steps)
                     queue.append((rollout.final, (*before, edge)))
 
-    def _startable(self, abstract: int) -> list[tuple[GroundOperator, Option]]:
-        """The options that may start: nothing is missing, or only what they delete themselves.
+    def _applicable(self, abstract: int) -> Sequence[tuple[GroundOperator, Option]]:
+        return [one for one in self.problem.operators if one[0].applicable(abstract)]
 
-        A skill that was stopped has deleted a part of it already.
+    def _startable(self, abstract: int) -> Sequence[tuple[GroundOperator, Option]]:
+        """Those for which nothing is missing but what they delete themselves; least missing first.
 
-        Args:
-            abstract: Abstract state to start from.
-
-        Returns:
-            The options with their operators, those first for which the least is missing.
+        A skill that was stopped on its way has deleted a part of it already.
         """
-        missing = {
-            number: ground.preconditions & ~abstract
-            for number, (ground, _) in enumerate(self.problem.operators)
-        }
-        able = [
-            number
-            for number, (ground, _) in enumerate(self.problem.operators)
-            if not missing[number] & ~ground.delete_effects
+        missing = [
+            (ground.preconditions & ~abstract, (ground, option))
+            for ground, option in self.problem.operators
         ]
-        able.sort(key=lambda number: missing[number].bit_count())
-        return [self.problem.operators[number] for number in able]
+        able = [(lacks, one) for lacks, one in missing if not lacks & ~one[0].delete_effects]
+        return [one for lacks, one in sorted(able, key=lambda pair: pair[0].bit_count())]
 
     def _may_lead_on(self, abstract: int) -> bool:
         """Whether each atom of the goal can be reached, as far as operators say."""

@@ -159,7 +159,9 @@ def _fits(box: OrientedBox, grasp: Pose) -> bool:
 def _off_middle(box: OrientedBox, grasp: Pose) -> float:
     """How far the middle of a box is from a grasp, the way the fingers move, m."""
     along = rotate(grasp.quaternion, FINGER_AXIS)
-    return sum(a * (b - c) for a, b, c in zip(along, box.pose.position, grasp.position, strict=True))
+    return sum(
+        a * (b - c) for a, b, c in zip(along, box.pose.position, grasp.position, strict=True)
+    )
 
 
 def _in_middle(box: OrientedBox, grasp: Pose) -> Pose:

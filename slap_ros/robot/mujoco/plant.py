@@ -33,6 +33,7 @@ from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINTS
 
 SETTLING_S = 0.3  # s, at least, before anything is measured
 LONGEST_SETTLING_S = 3.0  # s
+STOPPED = 3e-3  # m, by which fingers are behind that something stops; in the air, it is 1e-3
 RESTING = 1e-3  # m/s, rad/s: what is slower stands still
 
 Array = NDArray[np.float64]
@@ -144,10 +145,10 @@ class MujocoPlant:
         mujoco.mj_step(self._model, self._data)
 
     def _command_fingers_on(self) -> None:
-        """Move the fingers' command towards where they are to go, by a period's way."""
-        at = self._data.ctrl[JOINTS:]
-        way = FINGER_SPEED * PERIOD_S
-        at += np.clip(self._fingers_to - at, -way, way)
+        """Move the fingers' command on: by a period's way, or at once where they are stopped."""
+        at, way = self._data.ctrl[JOINTS:], FINGER_SPEED * PERIOD_S
+        stopped = np.abs(self._data.qpos[self._fingers_at] - at) > STOPPED
+        at += np.where(stopped, self._fingers_to - at, np.clip(self._fingers_to - at, -way, way))
 
     # -- all of it ------------------------------------------------------------------------------
 
