@@ -396,6 +396,19 @@ def test_what_slips_while_it_is_lifted_is_lifted_above_everything_all_the_same()
         assert "AboveEverything(duck)" in atoms(world.state)
 
 
+def test_a_hand_turns_where_a_joint_is_at_its_limit_before_a_toy_is_above_everything():
+    joints = (-0.0349, 0.6708, 0.4636, -2.0744, 2.5548, 3.6674, 0.9595)  # rad; the sixth up to 3.75
+    places = {"toy_robot": (0.3968, 0.1226, 2.2576), WIPER: (0.5, -0.12, 0.0)}
+    state = make_task(places, shipped()).initial_state
+    (robot,) = named(state, "robot")
+    state = state.replace({(robot, f"joint{i}"): q for i, q in enumerate(joints, start=1)})
+    with PandaWorld(scene_of(state, shipped()), state) as world:
+        world.step(np.array([*STILL[:7], 1.0]))
+        assert "Holding(robot, toy_robot)" in atoms(world.state)
+        carry_out(world, "Lift", "robot", "toy_robot", "table")
+        assert "AboveEverything(toy_robot)" in atoms(world.state)
+
+
 def test_what_is_lifted_may_touch_what_it_has_pushed():
     with in_hand(WIPER) as world:
         world.reset(changed(world.state, "dinosaur", x=0.55, y=-0.095))

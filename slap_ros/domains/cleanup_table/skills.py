@@ -62,6 +62,7 @@ UNDER = 0.016  # m, from the table to the grasp point at least, for the fingers'
 HIGHER = 0.008  # m, of a grasp whose palm stays above what stands beside a block
 PALM = 0.036  # m, from the grasp point to a block's top at most
 LIFT_MARGIN = 0.02  # m, by which a lifted block is higher than it need be
+OFF_TABLE = 0.01  # m, by which a block is lifted before the hand may turn
 READY_MARGIN = 0.005  # m, the same of the hand where it lets go
 INSIDE = 0.02  # m, between a block and the walls of the bin it is dropped into
 PLACES = 3  # in the bin, the nearest, that are looked at together
@@ -80,7 +81,10 @@ class MotionPaths(NamedTuple):
 
 
 def _across(
-    state: State, goals: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]
+    state: State,
+    goals: Sequence[Pose],
+    accepts: Callable[[Pose, Joints], bool],
+    start: Joints | None = None,
 ) -> MotionPaths:
     """The motion, on a planned path, to the nearest pose of the grasp point that is accepted.
 
@@ -88,11 +92,13 @@ def _across(
         state: State in which the motion begins.
         goals: Poses of the grasp point to choose among.
         accepts: Function that says whether a pose is accepted in a configuration of the joints.
+        start: Joint positions in which the motion begins, rad; None: those of the state.
 
     Raises:
         SkillNotApplicableError: None of them can be reached.
     """
-    q, free = joints_of(state), PLANNING_SCENE.checker(state, held_margin=CARRYING)
+    q = joints_of(state) if start is None else start
+    free = PLANNING_SCENE.checker(state, held_margin=CARRYING)
     nearest = nearest_configurations(goals, q, free=free) if goals else []
     candidates = [
         (np.stack([q, end]), goal)
@@ -248,10 +254,23 @@ def _up(state: State, block: Object, table: Object) -> MotionPaths:
     for _ in range(stages):
         up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, height / stages)), free=touching)
         if up is None:
-            raise SkillNotApplicableError(f"the arm cannot lift {block}")
+            return _up_turning(state, block, height, touching)
         paths.append(up[[0, -1]])
         q = up[-1]
     return MotionPaths(paths, touching)
+
+
+def _up_turning(state: State, block: Object, height: float, touching: Free) -> MotionPaths:
+    """Up with a hand that turns, where a joint's limit is in the way of the straight motion."""
+    q = joints_of(state)
+    x, y, z = grasp_pose(q).position
+    off = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, OFF_TABLE)), free=touching)
+    if off is None:
+        raise SkillNotApplicableError(f"the arm cannot lift {block}")
+    yaw = _yaw(grasp_pose(q))
+    turned = [from_above((x, y, z + height), yaw + 2.0 * math.pi * k / YAWS) for k in range(YAWS)]
+    paths, free = _across(state, turned, lambda *_: True, start=off[-1])
+    return MotionPaths([off[[0, -1]], *paths], free)
 
 
 def _touched(state: State, block: Object) -> list[Object]:
