@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plans from where no operators lead to the goal, because a skill changes more than they say.
+"""Plans from where no operators lead to the goal: a skill changed more than they say, or stopped.
 
 A block that was pushed or dropped may lie where no operator knows it: half on a target, say, on
 which there is then no room, though it is not on it. To pick it up makes room, and only the model
