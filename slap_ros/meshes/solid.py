@@ -20,6 +20,7 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
 
 Array = NDArray[np.float64]
+FLAT = 1e-3  # m, by which points of a face may be off its plane
 LEAST_VOLUME = 1e-12  # m³: a cube of a tenth of a millimetre
 
 
@@ -132,6 +133,19 @@ class Solid:
     def extent(self, axis: Vector) -> float:
         """How far the solid reaches from its centre of mass along an axis, to either side, m."""
         return float(np.abs(self.points @ np.array(axis)).max())
+
+    def stands_on(self, down: Vector) -> bool:
+        """Whether it stands on a plane without turning: on points all around its middle.
+
+        Args:
+            down: Unit vector along an axis of its own, to where it would stand.
+        """
+        depths = self.points @ np.array(down)
+        lowest = self.points[depths > depths.max() - FLAT]
+        x, y = (lowest[:, axis] for axis in range(3) if down[axis] == 0.0)
+        angles = np.sort(np.arctan2(y, x))
+        gaps = np.diff(angles, append=angles[0] + 2.0 * math.pi)
+        return bool(gaps.max() < math.pi)
 
     @cached_property
     def inertia(self) -> Vector:

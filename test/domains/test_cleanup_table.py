@@ -3,6 +3,8 @@
 """Cleanup Table: predicates, tasks, and tables really cleared in PyBullet."""
 
 import math
+from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,7 +33,8 @@ from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Column, State, Target
-from slap_ros.worlds.joint_space.features import ROBOT
+from slap_ros.worlds.features import BODY_FEATURES
+from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
 from support.executed import executed, fluent_atoms
@@ -342,3 +345,95 @@ def test_blocks_side_by_side_are_taken_one_after_the_other():
     places = {"duck": (0.45, 0.15, 0.0), "toy_robot": (0.55, 0.15, 0.0), WIPER: (0.5, -0.12, 0.0)}
     task = make_task(places, shipped())
     assert solve(task).success
+
+
+# -- skills on a robot, which is not quite where it should be -------------------------------------
+
+
+def named(state, *names):
+    return tuple(map(state.layout.object, names))
+
+
+def carry_out(world, skill, *names):
+    """To the end of its motion, whatever holds on the way."""
+    policy = FAIR.skills[skill].start(world.state, named(world.state, *names))
+    return carry_on(world, policy)
+
+
+def carry_on(world, policy):
+    """To the end of a policy; how many steps that takes."""
+    steps = 0
+    while (action := policy(world.state)) is not None:
+        world.step(action)
+        steps += 1
+    return steps
+
+
+@contextmanager
+def in_hand(block):
+    with PandaWorld(scene_of(LAID, shipped()), LAID) as world:
+        for skill in ("Reach", "Grasp"):
+            carry_out(world, skill, "robot", block, "table")
+        assert f"Holding(robot, {block})" in atoms(world.state)
+        yield world
+
+
+def test_what_slips_while_it_is_lifted_is_lifted_above_everything_all_the_same():
+    lift = FAIR.skills["Lift"]
+    with in_hand("duck") as world:
+        robot, duck, _ = about = named(world.state, "robot", "duck", "table")
+        policy = lift.start(world.state, about)
+        for _ in range(lift.lower_bound(world.state, about)):
+            world.step(policy(world.state))
+        above = margin(world.state, "AboveEverything", "duck")
+        assert 0.0 <= above < 0.01  # where nothing slips, its work is done
+        slipped = above + 0.003  # m, down, which is along the hand's z
+        low = float(world.state.get(robot, "grasp_z")) + slipped
+        sunk = float(world.state.get(duck, "z")) - slipped
+        world.reset(world.state.replace({(robot, "grasp_z"): low, (duck, "z"): sunk}))
+        assert "AboveEverything(duck)" not in atoms(world.state)
+        carry_on(world, policy)
+        assert "AboveEverything(duck)" in atoms(world.state)
+
+
+def test_a_hand_turns_where_a_joint_is_at_its_limit_before_a_toy_is_above_everything():
+    joints = (-0.0349, 0.6708, 0.4636, -2.0744, 2.5548, 3.6674, 0.9595)  # rad; the sixth up to 3.75
+    places = {"toy_robot": (0.3968, 0.1226, 2.2576), WIPER: (0.5, -0.12, 0.0)}
+    state = make_task(places, shipped()).initial_state
+    (robot,) = named(state, "robot")
+    state = state.replace({(robot, f"joint{i}"): q for i, q in enumerate(joints, start=1)})
+    with PandaWorld(scene_of(state, shipped()), state) as world:
+        world.step(np.array([*STILL[:7], 1.0]))
+        assert "Holding(robot, toy_robot)" in atoms(world.state)
+        carry_out(world, "Lift", "robot", "toy_robot", "table")
+        assert "AboveEverything(toy_robot)" in atoms(world.state)
+
+
+def test_what_is_lifted_may_touch_what_it_has_pushed():
+    with in_hand(WIPER) as world:
+        world.reset(changed(world.state, "dinosaur", x=0.55, y=-0.095))
+        carry_out(world, "Lift", "robot", WIPER, "table")
+        assert {"AboveEverything(wiper)", "On(dinosaur, table)"} <= atoms(world.state)
+
+
+def test_nothing_is_waited_for_where_a_tool_fell_out_of_the_hand():
+    with in_hand(WIPER) as world:
+        carry_out(world, "Lift", "robot", WIPER, "table")
+        robot, wiper, _ = about = named(world.state, "robot", WIPER, "bin")
+        policy = FAIR.skills["Drop"].start(world.state, about)
+        world.step(policy(world.state))
+        lost = {(wiper, f.name): float(LAID.get(wiper, f.name)) for f in BODY_FEATURES}
+        lost |= {(robot, f.name): float(LAID.get(robot, f.name)) for f in GRASP_FEATURES}
+        world.reset(world.state.replace(lost | {(robot, "finger"): 0.04}))
+        assert carry_on(world, policy) < 30
+        assert "On(wiper, table)" in atoms(world.state)
+
+
+def test_a_duck_on_its_side_is_cleared_away():
+    """It is as wide as open fingers, and its middle is beside its centre of mass."""
+    task = make_task({"duck": (0.45, 0.15, 0.4), WIPER: (0.5, -0.12, 0.0)}, shipped())
+    half = math.sqrt(0.5)
+    turned = changed(task.initial_state, "duck", z=0.03, qx=half, qy=0.0, qz=0.0, qw=half)
+    state = fallen(turned)
+    assert extent(state, state.layout.object("duck"))[1] < 0.056  # lower than on its feet
+    assert solve(replace(task, initial_state=state)).success

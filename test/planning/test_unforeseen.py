@@ -8,11 +8,14 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import UnsolvableError
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
+from support.executed import fluent_atoms
 
 DOMAIN = get_domain("obstacle_tower", "fair:obstacles=0,distractors=0")
 TASK = DOMAIN.task(0)
 WITH_TOWER = get_domain("obstacle_tower", "fair:obstacles=3,distractors=0")
 TOWER = WITH_TOWER.task(0)
+WITH_TOYS = get_domain("cleanup_table", "fair:toys=1")
+TABLE = WITH_TOYS.task(0)
 
 
 def half_on_target(beside):
@@ -74,6 +77,27 @@ def test_a_tower_that_leaves_no_room_at_the_target_is_taken_down(planner):
         assert episode.replans == 0
         assert episode.edges[0].option == "Unstack"
     assert rooms == {False, True}
+
+
+@pytest.mark.parametrize("planner", ["lazy", "anytime"])
+def test_what_was_lifted_half_of_the_way_is_lifted_on(planner):
+    """Off the table and not above everything: no operator begins there, as none ends there."""
+    state = TABLE.initial_state
+    about = tuple(map(state.layout.object, ("robot", "wiper", "table")))
+    with WITH_TOYS.make_world(state) as world:
+        for skill, steps in (("Reach", -1), ("Grasp", -1), ("Lift", 3)):
+            policy = WITH_TOYS.skills[skill].start(world.state, about)
+            while steps and (action := policy(world.state)) is not None:
+                world.step(action)
+                steps -= 1
+        lifted = world.state
+    atoms = fluent_atoms(lifted, WITH_TOYS)
+    assert "Holding(robot, wiper)" in atoms
+    assert not {"On(wiper, table)", "AboveEverything(wiper)"} & atoms
+    goal = WITH_TOYS.atom_space(lifted).mask(TABLE.goal)
+    plan = make_planner(planner, WITH_TOYS, lifted).plan(lifted, goal).plan
+    lift, drop, *_ = map(str, (edge.option for edge in plan.edges))
+    assert (lift, drop) == ("Lift(robot, wiper, table)", "Drop(robot, wiper, bin)")
 
 
 def test_what_no_skill_can_do_stays_unsolvable():

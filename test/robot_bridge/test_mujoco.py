@@ -134,6 +134,41 @@ def test_a_block_is_lifted_by_friction_alone_and_falls_when_it_is_let_go(tower):
     assert plant.poses()["block1"].position[2] == pytest.approx(z, abs=SHIFT)
 
 
+def grasped_askew(plant, name):
+    """Fingers press a toy from above, 0.2 rad askew and over its middle; the grasp and the toy."""
+    x, y, z = plant.poses()[name].position
+    turn = plant.poses()[name].quaternion
+    yaw = 2.0 * math.atan2(turn[2], turn[3]) + 0.2
+    start = np.array(plant.joints)
+    over = inverse_kinematics(from_above((x, y, z + LIFT), yaw), start)
+    moved(plant, over, 1.0)
+    moved(plant, inverse_kinematics(from_above((x, y, z + 0.008), yaw), over), 1.0)
+    plant.command_fingers(0.0)
+    passed(plant, 1.0)
+    moved(plant, over, 1.0)
+
+
+def test_a_toy_stays_in_the_hand_as_it_was_grasped_and_falls_straight_down():
+    """Fingers of 70 N on 10 g: they slid along its sides by a centimetre, and flung it away."""
+    domain = get_domain("cleanup_table")
+    plant = MujocoPlant.of(domain, domain.task(1).initial_state)
+    grasped_askew(plant, "duck")
+    held, gap = plant.poses()["duck"], plant.gap
+    passed(plant, 4.0)
+    later = plant.poses()["duck"]
+    assert math.dist(held.position, later.position) < 0.0005
+    assert held.angle_to(later) < 0.005
+    assert plant.gap == pytest.approx(gap, abs=0.0005)
+    plant.command_fingers(0.04)
+    fastest = 0.0
+    for _ in range(500):
+        plant.step()
+        fastest = max(fastest, plant.gap_velocity)
+    assert plant.gap == pytest.approx(0.08, abs=0.002)
+    assert fastest < 0.2  # m/s, of both fingers together, which do 50 mm/s each
+    assert math.dist(plant.poses()["duck"].position[:2], held.position[:2]) < 0.03
+
+
 def test_an_arm_that_moves_lags_behind_what_it_is_told(tower):
     plant = MujocoPlant.of(*tower)
     target = np.add(plant.joints, np.eye(7)[0] * 0.3)

@@ -7,11 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from slap_ros.domains.cleanup_table.shapes import shipped
 from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import NO_ROTATION, Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.robot.tracking import Detection, Track, TrackingSettings, measured_pose
-from slap_ros.worlds.joint_space.scene import TABLE, TABLE_TOP, cube
+from slap_ros.worlds.joint_space.scene import TABLE, TABLE_TOP, Mesh, cube
 from slap_ros.worlds.joint_space.settling import resting_poses
 
 SENSING = TrackingSettings(position_noise_m=0.002)
@@ -112,6 +113,23 @@ def test_what_leans_or_floats_is_left_as_it_was_seen():
     floating = Pose((0.4, 0.2, 0.3))
     found = resting_poses({0: leaning, 1: floating}, [cube("a"), cube("b")], [TABLE.at(TABLE.pose)])
     assert found == {0: leaning, 1: floating}
+
+
+def test_a_toy_is_turned_flat_onto_a_face_but_not_onto_an_edge():
+    """A duck on its side leans on its body and its head; flat, it would stand on its middle."""
+    toys = shipped()
+    leaning = (math.sin(0.05), 0.0, 0.0, math.cos(0.05))
+    upright = Pose((0.5, 0.0, TABLE_TOP + 0.022), leaning)
+    on_side = Pose(
+        (0.4, 0.2, TABLE_TOP + 0.025), (math.sin(math.pi / 4 + 0.05), 0.0, 0.0, math.cos(0.8354))
+    )
+    table = [TABLE.at(TABLE.pose)]
+    bodies = [Mesh("a", toys["duck"]), Mesh("b", toys["duck"]), Mesh("c", toys["toy_robot"])]
+    found = resting_poses({0: upright, 1: on_side}, bodies, table)
+    assert found[0].angle_to(Pose((0.0, 0.0, 0.0))) < 1e-9
+    assert found[1] == on_side
+    found = resting_poses({2: on_side}, bodies, table)  # a robot lies flat on its arm
+    assert found[2].angle_to(on_side) == pytest.approx(0.1, abs=1e-3)
 
 
 def test_cameras_hang_from_the_base_by_static_frames():

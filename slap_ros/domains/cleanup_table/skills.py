@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slap_ros.core import Action, Policy, Skill
-from slap_ros.domains.cleanup_table.features import BLOCK, VELOCITY, WALL
+from slap_ros.domains.cleanup_table.features import BLOCK, SURFACE, VELOCITY, WALL
 from slap_ros.domains.cleanup_table.predicates import ON
 from slap_ros.domains.cleanup_table.relations import HAND_CLEAR, OVER, SLOW, TIP, cleanup_relations
 from slap_ros.domains.cleanup_table.scene import PLANNING_SCENE, carried
@@ -56,11 +56,13 @@ from slap_ros.worlds.joint_space.gripper import GRASP_REACH
 from slap_ros.worlds.panda import FINGER_OPEN, JOINTS, grasp_pose
 
 YAWS = 16  # of the hand, evenly round
+FINGER_AXIS = (0.0, 1.0, 0.0)  # the way the fingers move, seen from the grasp point
 FINGER_ROOM = 0.005  # m, on each side of a block between the open fingers
 UNDER = 0.016  # m, from the table to the grasp point at least, for the fingers' ends
 HIGHER = 0.008  # m, of a grasp whose palm stays above what stands beside a block
 PALM = 0.036  # m, from the grasp point to a block's top at most
 LIFT_MARGIN = 0.02  # m, by which a lifted block is higher than it need be
+OFF_TABLE = 0.01  # m, by which a block is lifted before the hand may turn
 READY_MARGIN = 0.005  # m, the same of the hand where it lets go
 INSIDE = 0.02  # m, between a block and the walls of the bin it is dropped into
 PLACES = 3  # in the bin, the nearest, that are looked at together
@@ -79,7 +81,10 @@ class MotionPaths(NamedTuple):
 
 
 def _across(
-    state: State, goals: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]
+    state: State,
+    goals: Sequence[Pose],
+    accepts: Callable[[Pose, Joints], bool],
+    start: Joints | None = None,
 ) -> MotionPaths:
     """The motion, on a planned path, to the nearest pose of the grasp point that is accepted.
 
@@ -87,11 +92,13 @@ def _across(
         state: State in which the motion begins.
         goals: Poses of the grasp point to choose among.
         accepts: Function that says whether a pose is accepted in a configuration of the joints.
+        start: Joint positions in which the motion begins, rad; None: those of the state.
 
     Raises:
         SkillNotApplicableError: None of them can be reached.
     """
-    q, free = joints_of(state), PLANNING_SCENE.checker(state, held_margin=CARRYING)
+    q = joints_of(state) if start is None else start
+    free = PLANNING_SCENE.checker(state, held_margin=CARRYING)
     nearest = nearest_configurations(goals, q, free=free) if goals else []
     candidates = [
         (np.stack([q, end]), goal)
@@ -135,7 +142,13 @@ def grasps(state: State, block: Object, table: Object) -> list[Pose]:
         for yaw in yaws
         if height - z < GRASP_REACH
     ]
-    return [pose for pose in poses if _fits(box, pose)]
+    fitting = [pose for pose in poses if _fits(box, pose)]
+    if fitting:
+        return fitting
+    # What was pushed over may be heavy on one side: the hand grasps it in the middle.
+    poses = [_in_middle(box, pose) for pose in poses]
+    near = [pose for pose in poses if math.dist(pose.position, (x, y, z)) < GRASP_REACH]
+    return [pose for pose in near if _fits(box, pose)]
 
 
 def _yaw(pose: Pose) -> float:
@@ -145,9 +158,22 @@ def _yaw(pose: Pose) -> float:
 
 def _fits(box: OrientedBox, grasp: Pose) -> bool:
     """Whether the fingers, opened wide, go down at both sides of a box."""
-    along = rotate(grasp.quaternion, (0.0, 1.0, 0.0))  # the way the fingers move
-    off = sum(a * (b - c) for a, b, c in zip(along, box.pose.position, grasp.position, strict=True))
-    return abs(off) + box.half_extent(along) <= FINGER_OPEN - FINGER_ROOM
+    along = rotate(grasp.quaternion, FINGER_AXIS)
+    return abs(_off_middle(box, grasp)) + box.half_extent(along) <= FINGER_OPEN - FINGER_ROOM
+
+
+def _off_middle(box: OrientedBox, grasp: Pose) -> float:
+    """How far the middle of a box is from a grasp, the way the fingers move, m."""
+    along = rotate(grasp.quaternion, FINGER_AXIS)
+    return sum(
+        a * (b - c) for a, b, c in zip(along, box.pose.position, grasp.position, strict=True)
+    )
+
+
+def _in_middle(box: OrientedBox, grasp: Pose) -> Pose:
+    """A grasp moved the way the fingers move, so that a box is in the middle between them."""
+    off, (x, y, z) = _off_middle(box, grasp), rotate(grasp.quaternion, FINGER_AXIS)
+    return shifted(grasp, (off * x, off * y, off * z))
 
 
 def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
@@ -221,17 +247,42 @@ def _down(state: State, block: Object, table: Object) -> MotionPaths:
 
 def _up(state: State, block: Object, table: Object) -> MotionPaths:
     """Up until what is held is above everything, 5 cm after 5 cm."""
-    touching = PLANNING_SCENE.checker(state, (table,))
+    touching = PLANNING_SCENE.checker(state, (table, *_touched(state, block)))
     height = LIFT_MARGIN - _above(state, block)
     stages = max(1, math.ceil(height / CLEARANCE))
     q, paths = joints_of(state), []
     for _ in range(stages):
         up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, height / stages)), free=touching)
         if up is None:
-            raise SkillNotApplicableError(f"the arm cannot lift {block}")
+            return _up_turning(state, block, height, touching)
         paths.append(up[[0, -1]])
         q = up[-1]
     return MotionPaths(paths, touching)
+
+
+def _up_turning(state: State, block: Object, height: float, touching: Free) -> MotionPaths:
+    """Up with a hand that turns, where a joint's limit is in the way of the straight motion."""
+    q = joints_of(state)
+    x, y, z = grasp_pose(q).position
+    off = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, OFF_TABLE)), free=touching)
+    if off is None:
+        raise SkillNotApplicableError(f"the arm cannot lift {block}")
+    yaw = _yaw(grasp_pose(q))
+    turned = [from_above((x, y, z + height), yaw + 2.0 * math.pi * k / YAWS) for k in range(YAWS)]
+    paths, free = _across(state, turned, lambda *_: True, start=off[-1])
+    return MotionPaths([off[[0, -1]], *paths], free)
+
+
+def _touched(state: State, block: Object) -> list[Object]:
+    """The blocks that the arm, or the block that it holds, touches already: it pushed them."""
+    blocks = state.layout.of_type(BLOCK)
+    surfaces, q = state.layout.of_type(SURFACE), joints_of(state)
+
+    def is_touched(other: Object) -> bool:
+        rest = (*surfaces, *(one for one in blocks if one != other))
+        return not bool(PLANNING_SCENE.checker(state, rest)(q[None])[0])
+
+    return [other for other in blocks if other != block and is_touched(other)]
 
 
 def _to_bin(state: State, block: Object, drawer: Object) -> MotionPaths:
@@ -282,10 +333,16 @@ def _with_joints(state: State, positions: Joints) -> State:
 # -- skills ---------------------------------------------------------------------------------------
 
 
-def _landed(state: State, block: Object, drawer: Object) -> bool:
-    """Whether a block lies in the bin, and what it fell on lies still again."""
-    moving = state.gather(state.layout.column_of(BLOCK), VELOCITY)
-    return bool((np.square(moving).sum(axis=-1) < SLOW**2).all()) and ON(block, drawer).holds(state)
+def _is_decided(state: State, block: Object, drawer: Object) -> bool:
+    """Whether a block lies in the bin, and what it fell on lies still; or never will.
+
+    Where nothing moves, nothing more happens: it fell out of the hand, say, on the way.
+    """
+    velocities = state.gather(state.layout.column_of(BLOCK), VELOCITY)
+    if not velocities.any():
+        return True
+    slow = (np.square(velocities).sum(axis=-1) < SLOW**2).all()
+    return bool(slow) and ON(block, drawer).holds(state)
 
 
 class WaitForOutcome:
@@ -310,7 +367,7 @@ class MotionSkill:
         name: Name of the operator.
         timing: Timing of the paths.
         motion: Function from a state, a block and a surface to the paths of the arm.
-        until: Condition that ends the motion on the way; None: it ends at its goal.
+        until: Condition in which its work is done, maybe on the way; None: it is at its goal.
         grip: Gripper commands after the motion.
         step_limit: Environment steps after which the skill fails.
     """
@@ -330,21 +387,32 @@ class MotionSkill:
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
         """As many as it takes; where it cannot be planned, any bound is admissible."""
         try:
-            return max(1, len(_trajectory(self, state, objects)))
+            return max(1, _planned(self, state, objects).least_steps)
         except SkillNotApplicableError:
             return self.step_limit
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Plan the motion.
 
+        It is planned beyond where its work is done: a robot is not there yet by a hair where the
+        model is, and goes on.
+
         Raises:
             SkillNotApplicableError: There is no way for the arm.
         """
-        return TrajectoryFollower(_trajectory(self, state, objects), self.timing.max_step)
+        trajectory = _planned(self, state, objects).trajectory
+        return TrajectoryFollower(trajectory, self.timing.max_step)
+
+
+class PlannedMotion(NamedTuple):
+    """A skill's motion from a state."""
+
+    trajectory: Trajectory
+    least_steps: int  # after which its work is done, if the arm is where it should be
 
 
 @memoized
-def _trajectory(skill: MotionSkill, state: State, objects: tuple[Object, ...]) -> Trajectory:
+def _planned(skill: MotionSkill, state: State, objects: tuple[Object, ...]) -> PlannedMotion:
     """Positions with gripper commands.
 
     Raises:
@@ -353,13 +421,14 @@ def _trajectory(skill: MotionSkill, state: State, objects: tuple[Object, ...]) -
     _, block, surface = objects
     paths, free = skill.motion(state, block, surface)
     positions = skill.timing.positions(paths, free)
-    if skill.until is not None:
-        there = skill.until(state, block, positions)
-        if not there.any():
-            raise SkillNotApplicableError(f"{skill.name} of {block} does not get where it should")
-        positions = positions[: int(there.argmax()) + 1]
     end = positions[-1] if len(positions) else joints_of(state)
-    return [*((q, 0.0) for q in positions), *((end, command) for command in skill.grip)]
+    trajectory = [*((q, 0.0) for q in positions), *((end, command) for command in skill.grip)]
+    if skill.until is None:
+        return PlannedMotion(trajectory, len(trajectory))
+    there = skill.until(state, block, positions)
+    if not there.any():
+        raise SkillNotApplicableError(f"{skill.name} of {block} does not get where it should")
+    return PlannedMotion(trajectory, int(there.argmax()) + 1)
 
 
 @dataclass(frozen=True)
@@ -370,7 +439,7 @@ class DropSkill(MotionSkill):
         """Plan the motion, and wait after it; see :class:`MotionSkill`."""
         _, block, drawer = objects
         policy = super().start(state, objects)
-        return WaitForOutcome(policy, lambda now: _landed(now, block, drawer))
+        return WaitForOutcome(policy, lambda now: _is_decided(now, block, drawer))
 
 
 def skills(timing: Timing) -> dict[str, Skill]:

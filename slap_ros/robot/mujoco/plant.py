@@ -21,6 +21,7 @@ from slap_ros.robot.mujoco.arm import (
     ARM_JOINTS,
     FINGER_FORCE,
     FINGER_JOINTS,
+    FINGER_SPEED,
     LARGEST_FINGER_FORCE,
     PERIOD_S,
 )
@@ -32,6 +33,7 @@ from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINTS
 
 SETTLING_S = 0.3  # s, at least, before anything is measured
 LONGEST_SETTLING_S = 3.0  # s
+STOPPED = 3e-3  # m, by which fingers are behind that something stops; in the air, it is 1e-3
 RESTING = 1e-3  # m/s, rad/s: what is slower stands still
 
 Array = NDArray[np.float64]
@@ -124,19 +126,29 @@ class MujocoPlant:
         self._data.ctrl[:JOINTS] = joints
 
     def command_fingers(self, finger: float, force: float = FINGER_FORCE) -> None:
-        """Have the fingers move from now on.
+        """Have the fingers move from now on, no faster than a real gripper's.
 
         Args:
             finger: Distance of each finger from the middle, m.
             force: Largest force of each finger, N.
         """
         limit = min(force, LARGEST_FINGER_FORCE)
-        self._data.ctrl[JOINTS:] = finger
+        self._fingers_to = finger
+        # Fingers that open do so from where they are, and let go of what they press at once.
+        at = np.minimum(self._data.qpos[self._fingers_at], finger)
+        self._data.ctrl[JOINTS:] = np.maximum(self._data.ctrl[JOINTS:], at)
         self._model.actuator_forcerange[JOINTS:] = (-limit, limit)
 
     def step(self) -> None:
         """Let a period pass."""
+        self._command_fingers_on()
         mujoco.mj_step(self._model, self._data)
+
+    def _command_fingers_on(self) -> None:
+        """Move the fingers' command on: by a period's way, or at once where they are stopped."""
+        at, way = self._data.ctrl[JOINTS:], FINGER_SPEED * PERIOD_S
+        stopped = np.abs(self._data.qpos[self._fingers_at] - at) > STOPPED
+        at += np.where(stopped, self._fingers_to - at, np.clip(self._fingers_to - at, -way, way))
 
     # -- all of it ------------------------------------------------------------------------------
 

@@ -46,6 +46,11 @@ class Box(RigidBody):
         """How far the box reaches from its origin along a unit vector, m."""
         return sum(abs(a) * half for a, half in zip(axis, self.half_extents_m, strict=True))
 
+    def stands_on(self, down: Vector) -> bool:
+        """Whether the box stands on a plane without turning, with an axis of its own downwards."""
+        del down
+        return True
+
 
 @dataclass(frozen=True)
 class Mesh(RigidBody):
@@ -69,6 +74,10 @@ class Mesh(RigidBody):
     def extent(self, axis: Vector) -> float:
         """How far the mesh reaches from its origin along a unit vector, m."""
         return self.shape.extent(axis)
+
+    def stands_on(self, down: Vector) -> bool:
+        """Whether the mesh stands on a plane without turning, with an axis of its own downwards."""
+        return self.shape.stands_on(down)
 
 
 Body = Box | Mesh

@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.geometry.pose import Pose, Vector
+from slap_ros.geometry.pose import Pose, Vector, conjugate, rotate
 from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.settling import DISTANCE_ERROR, FLOATING, levelled
 
@@ -73,12 +73,18 @@ class SupportSearch:
     def _options(self, i: int, below: Sequence[OrientedBox]) -> list[Option]:
         measured, body, eye = self._measured[i], self._bodies[i], self._eyes.get(i)
         pose = levelled(measured)
-        if pose is None:
+        if pose is None or not body.stands_on(_down(pose)):
             return [(measured, 0.0)]
         if eye is None:
             return [(_put_down(pose, body, below) or measured, 0.0)]
         supported = _in_sight(pose, body, below, eye)
         return sorted([*supported, (measured, CONFLICT)], key=lambda option: option[1])
+
+
+def _down(pose: Pose) -> Vector:
+    """Which of its own axes a body with a vertical one points downwards."""
+    x, y, z = (round(part) for part in rotate(conjugate(pose.quaternion), (0.0, 0.0, -1.0)))
+    return (float(x), float(y), float(z))
 
 
 def _put_down(pose: Pose, body: Body, below: Sequence[OrientedBox]) -> Pose | None:
