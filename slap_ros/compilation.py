@@ -41,8 +41,9 @@ SOURCES = (
     "domains/obstacle2d/kernels.py",
     "shortcuts/kernels.py",
     "portable_math.py",
-    "geometry/box_separation.py",
+    "geometry/*.py",
     "worlds/panda.py",
+    "worlds/joint_space/*.py",
 )
 _config: Any = numba.config
 logger = logging.getLogger(__name__)
