@@ -20,6 +20,8 @@ from slap_ros.motion.joints import Array
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, LAST_LINK, matrix
 from slap_ros.worlds.panda import JOINTS, LINKS, link_poses
 
+SURELY = 1.0 + 1e-9  # times a squared distance: no rounding comes near it
+
 
 class MovingShapes(NamedTuple):
     """Boxes, each fixed to one of link 1 to link 7, with what is to be kept clear around them."""
@@ -41,6 +43,8 @@ class CollisionScene(NamedTuple):
     sizes: Array  # half the obstacles' edges, m, shape (o, 3)
     origins: Array  # the base's origin seen from the obstacles, negated, m, shape (o, 3)
     reaches2: Array  # squared distance, m², from a shape's centre to a box it may touch: (s, o)
+    middles: Array  # centres of the obstacles, m, shape (o, 3)
+    far2: Array  # squared distance, m², from centre to centre, from which on that is ruled out
 
     def digest(self) -> bytes:
         """Equal for equal scenes."""
@@ -69,7 +73,9 @@ def make_scene(
     reaches2 = np.repeat(reaches[:, None] ** 2, len(boxes), axis=1)
     if base:
         reaches2[:BEHIND_ELBOW, -1] = 0.0  # never tested: these are fixed to it
-    return CollisionScene(*shapes, turns, sizes, origins, reaches2)
+    middles = np.ascontiguousarray(poses[:, :3, 3])
+    far2 = (np.sqrt(reaches2) + np.sqrt(dot(sizes, sizes))) ** 2 * SURELY
+    return CollisionScene(*shapes, turns, sizes, origins, reaches2, middles, far2)
 
 
 @lru_cache(maxsize=256)  # of many states; nobody changes the arrays
