@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.state_access import finger_of, grasp_of, held_body
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import CollisionChecker
@@ -48,7 +49,7 @@ class PlanningScene:
         """
         held = held_body(state)
         obstacles = [
-            box for thing, box in self.solid(state) if thing != held and thing not in touched
+            box for thing, box in _solid(self, state) if thing != held and thing not in touched
         ]
         return CollisionChecker(
             obstacles,
@@ -59,3 +60,9 @@ class PlanningScene:
 
     def _in_hand(self, state: State, held: Object) -> OrientedBox:
         return self.carried(state, held).at(grasp_of(state))
+
+
+@memoized
+def _solid(scene: PlanningScene, state: State) -> tuple[tuple[Object, OrientedBox], ...]:
+    """The boxes that things fill in a state: its retreat, crossing and approach all ask."""
+    return tuple(scene.solid(state))
