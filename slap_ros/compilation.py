@@ -39,6 +39,7 @@ SOURCES = (
     "policies/kernels.py",
     "domains/classifiers.py",
     "domains/obstacle2d/kernels.py",
+    "domains/obstacle_tower/*.py",
     "shortcuts/kernels.py",
     "portable_math.py",
     "geometry/*.py",

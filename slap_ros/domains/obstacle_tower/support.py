@@ -18,7 +18,7 @@ things are at a height to touch, and one call of numpy takes longer than to find
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +38,7 @@ from slap_ros.domains.tabletop.scalar_box import ScalarBox
 from slap_ros.relational import State
 from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
+from slap_ros.tiered_function import TieredFunction
 
 TOUCHING = 0.004  # m, height over a thing at which a block still lies on it
 CENTRED = 0.015  # m, distance from the target's middle at which a block still is in it
@@ -115,17 +116,35 @@ class SupportTruths(NamedTuple):
 @cache_latest
 def support_truths(state: State) -> SupportTruths:
     """The truths of a single state; only what is at a height to touch is examined closely."""
-    objects, values = TowerObjectIndex.of(state.layout), state.data.tolist()
-    boxes = [ScalarBox(*read(values)) for read in objects.boxes]
+    objects, data = TowerObjectIndex.of(state.layout), state.data
     is_movable, is_target, held = (
-        [values[i] > 0.5 for i in label.tolist()]
-        for label in (objects.is_movable, objects.is_target, objects.held)
+        data.take(labels) > 0.5 for labels in (objects.is_movable, objects.is_target, objects.held)
     )
-    targets = [boxes[i] for i in range(objects.blocks, len(boxes)) if is_target[i]]
-    on = np.zeros((objects.blocks, len(boxes)), dtype=bool)
-    room = np.ones(len(boxes), dtype=bool)
-    for number, block in enumerate(boxes[: objects.blocks]):
-        for i, thing in enumerate(boxes):
+    support = SUPPORT.of(1)
+    on, room = support(data.take(objects.boxes), objects.blocks, is_movable, is_target)
+    return SupportTruths(objects, on.reshape(-1), room, held, np.array([not held.any()]))
+
+
+# From boxes, blocks before surfaces, the number of blocks, and labels of all, to which block is on
+# which thing, shape (blocks, things), and which thing has room for a block, shape (things,).
+Support = Callable[[Array, int, Bools, Bools], tuple[Bools, Bools]]
+
+
+def support(boxes: Array, blocks: int, is_movable: Bools, is_target: Bools) -> tuple[Bools, Bools]:
+    """What lies on what, by plain floats; see :data:`Support`.
+
+    Args:
+        boxes: Arguments of a ``ScalarBox`` for each thing, shape (things, 10).
+        blocks: Number of blocks, which come first.
+        is_movable: Whether each thing is, shape (things,).
+        is_target: Whether each thing is, shape (things,).
+    """
+    things = [ScalarBox(*box) for box in boxes.tolist()]
+    targets = [thing for i, thing in enumerate(things) if i >= blocks and is_target[i]]
+    on = np.zeros((blocks, len(things)), dtype=bool)
+    room = np.ones(len(things), dtype=bool)
+    for number, block in enumerate(things[:blocks]):
+        for i, thing in enumerate(things):
             if abs(block.bottom - thing.top) > TOUCHING:
                 continue
             covers = block.covers(thing)
@@ -135,8 +154,16 @@ def support_truths(state: State) -> SupportTruths:
                 on[number, i] = covers and (is_movable[i] or not _is_on_any(block, targets))
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    empty = np.array([not any(held)])
-    return SupportTruths(objects, on.reshape(-1), room, np.array(held, bool), empty)
+    return on, room
+
+
+def _compiled_support() -> Support:
+    from slap_ros.domains.obstacle_tower import kernels
+
+    return kernels.support
+
+
+SUPPORT: TieredFunction[Support] = TieredFunction(support, _compiled_support)
 
 
 def _is_on_any(block: ScalarBox, targets: Sequence[ScalarBox]) -> bool:
