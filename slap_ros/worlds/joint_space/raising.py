@@ -85,7 +85,5 @@ def within_limits(joints: Configuration, displacement: Sequence[float]) -> Confi
         joints: Joint positions, rad.
         displacement: How far each is to move, rad.
     """
-    moved = (q + d for q, d in zip(joints, displacement, strict=True))
-    return tuple(
-        min(max(q, low), high) for low, q, high in zip(JOINT_LOW, moved, JOINT_HIGH, strict=True)
-    )
+    moved = zip(joints, displacement, JOINT_LOW, JOINT_HIGH, strict=True)
+    return tuple([min(max(q + d, low), high) for q, d, low, high in moved])

@@ -153,9 +153,10 @@ class PandaWorld(SimulatedWorld[Scene]):
         start = self._posture
         if gripped is not self._snapshot:  # the fingers are still where they were
             start = self._arm(replace(gripped, finger=self._snapshot.finger))
-        goal = replace(gripped, joints=within_limits(gripped.joints, displacement))
+        goal = gripped.with_joints(within_limits(gripped.joints, displacement))
+        before = self._snapshot
         self._snapshot, self._posture = self._after(gripped, goal, start)
-        self._state = self._index.write(self._state, self._snapshot)
+        self._state = self._index.write(self._state, before, self._snapshot)
         return self._state
 
     def joints_off_fixed_bodies(
@@ -177,7 +178,7 @@ class PandaWorld(SimulatedWorld[Scene]):
         return off_fixed_bodies(
             start,
             self._snapshot.joints,
-            lambda joints: self._arm(replace(self._snapshot, joints=joints)),
+            lambda joints: self._arm(self._snapshot.with_joints(joints)),
             self._obstacles,
             highest,
             depth,
@@ -210,7 +211,7 @@ class PandaWorld(SimulatedWorld[Scene]):
                     goal, sweep, bodies, depth = other, way, relieved, less
         if depth > JAM_LIMIT:
             bodies = self._frozen(now, sweep.end)
-        return replace(goal, bodies=bodies), sweep.end
+        return goal.with_bodies(bodies), sweep.end
 
     def _sliding(self, now: Snapshot, goal: Snapshot, start: Posture) -> Snapshot:
         """The goal with the arm raised until it enters nothing; ``now`` if it cannot be raised."""
@@ -219,7 +220,7 @@ class PandaWorld(SimulatedWorld[Scene]):
             penetration = sweep.deepest_penetration(self._obstacles)
             if penetration is None:
                 return now if sweep.hits(self._obstacles) else goal
-            goal = replace(goal, joints=raised(now.joints, goal.joints, penetration))
+            goal = goal.with_joints(raised(now.joints, goal.joints, penetration))
         return now
 
     def _arm(self, snapshot: Snapshot) -> Posture:
@@ -286,7 +287,7 @@ def _half_way(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     """The goal half as far away: what is pressed has more time to give way."""
     del depth
     joints = tuple((a + b) / 2.0 for a, b in zip(now.joints, goal.joints, strict=True))
-    return replace(goal, joints=joints)
+    return goal.with_joints(joints)
 
 
 def _stay(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
@@ -300,7 +301,7 @@ def _hand_raised(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     if goal.joints == now.joints:
         return now
     penetration = Penetration(HAND, grasp_pose(goal.joints).position, depth)
-    return replace(goal, joints=raised(now.joints, goal.joints, penetration))
+    return goal.with_joints(raised(now.joints, goal.joints, penetration))
 
 
 def _rests(before: BodyState, after: BodyState) -> bool:
