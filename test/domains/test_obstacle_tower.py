@@ -10,7 +10,7 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower.features import BLOCK, TowerObjectIndex
-from slap_ros.domains.obstacle_tower.support import SUPPORT, support
+from slap_ros.domains.obstacle_tower.support import MARGINS, SUPPORT, margins, support
 from slap_ros.domains.obstacle_tower.tasks import (
     PaperTowerTasks,
     RandomTowerTasks,
@@ -111,6 +111,10 @@ def test_compiled_code_perceives_the_same():
             (on, room), (other_on, other_room) = support(*given), SUPPORT.compiled()(*given)
             assert (on == other_on).all() and (room == other_room).all()
             rests += int(on.sum())
+        for many in (row, random_states(initial, rng, 40).data.reshape(2, 20, -1)):
+            by_numpy, by_kernel = margins(index, many), MARGINS.compiled()(index, many)
+            for found, other in zip(by_numpy, by_kernel, strict=True):
+                assert found.shape == other.shape and (found == other).all()
     assert rests > 100
 
 

@@ -33,6 +33,7 @@ from slap_ros.domains.tabletop.footprints import (
     half_widths,
     inverse_yaws,
     steepened,
+    turned,
 )
 from slap_ros.domains.tabletop.scalar_box import ScalarBox
 from slap_ros.relational import State
@@ -54,11 +55,26 @@ class SupportRelations(NamedTuple):
 
 @cache_latest
 def support_relations(state: State) -> SupportRelations:
-    """All margins at once, as predicates share most of the work.
+    """All margins at once, as predicates share most of the work."""
+    objects, data = TowerObjectIndex.of(state.layout), state.data
+    on, room = MARGINS.of(data.size // data.shape[-1])(objects, data)
+    return SupportRelations(objects, on.reshape(*on.shape[:-2], -1), room)
+
+
+# From objects and features, shape (..., features), to margins of blocks on things, m, shape
+# (..., blocks, things), and of room for a block on things, m, shape (..., things).
+Margins = Callable[[TowerObjectIndex, Array], tuple[Array, Array]]
+
+
+def margins(objects: TowerObjectIndex, data: Array) -> tuple[Array, Array]:
+    """What lies on what, as margins, by numpy; see :data:`Margins`.
 
     Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
+
+    Args:
+        objects: Where the features of things are.
+        data: Features of one state or of many, shape (..., features).
     """
-    objects, data = TowerObjectIndex.of(state.layout), state.data
     blocks = slice(objects.blocks)
     q = data.take(objects.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
@@ -74,7 +90,7 @@ def support_relations(state: State) -> SupportRelations:
 
     is_movable = data.take(objects.is_movable, axis=-1) > 0.5
     is_target = data.take(objects.is_target, axis=-1) > 0.5
-    centred = CENTRED - np.abs(offset)
+    centred = CENTRED - np.hypot(offset.real, offset.imag)
     to_target = np.where(is_target[..., None, :], centred, -1.0)[..., objects.blocks :]
     off_target = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
     on_table = np.minimum(covers, off_target)
@@ -83,8 +99,26 @@ def support_relations(state: State) -> SupportRelations:
     on = np.minimum(touches, sideways)
 
     over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
-    room = np.where(is_movable | is_target, strictly(-over), 1.0)
-    return SupportRelations(objects, on.reshape(*on.shape[:-2], -1), room)
+    return on, np.where(is_movable | is_target, strictly(-over), 1.0)
+
+
+def _compiled_margins() -> Margins:
+    from slap_ros.domains.obstacle_tower import kernels
+
+    def compiled(objects: TowerObjectIndex, data: Array) -> tuple[Array, Array]:
+        rows = data.reshape(-1, data.shape[-1])
+        movable, target = (
+            rows.take(labels, axis=-1) > 0.5 for labels in (objects.is_movable, objects.is_target)
+        )
+        boxes = rows.take(objects.boxes, axis=-1)
+        on, room = kernels.margins(boxes, objects.blocks, movable, target)
+        batch = data.shape[:-1]
+        return on.reshape(*batch, *on.shape[1:]), room.reshape(*batch, -1)
+
+    return compiled
+
+
+MARGINS: TieredFunction[Margins] = TieredFunction(margins, _compiled_margins)
 
 
 def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
@@ -99,7 +133,7 @@ def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
     back = inverse_yaws(q, edges)[..., None, :]
     width = half_widths(complex_of(edges[..., :6])[..., None, :], back)
     own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
-    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(offset * back)
+    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(turned(offset, back))
     return np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
 
 

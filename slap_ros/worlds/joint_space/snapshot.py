@@ -84,7 +84,7 @@ class SceneIndex(LayoutIndex):
 
         Args:
             state: State to change.
-            before: Its physics; bodies that are the same object afterwards are as they were.
+            before: Physics of that state. What is the same object in both is not written.
             after: Physics to write.
         """
         data, grasp = state.data.copy(), after.grasp
