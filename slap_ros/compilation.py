@@ -48,6 +48,7 @@ SOURCES = (
     "geometry/pose.py",
     "worlds/panda.py",
     "worlds/joint_space/arm.py",
+    "worlds/joint_space/drive.py",
     "worlds/joint_space/kernels.py",
     "worlds/joint_space/links.py",
 )

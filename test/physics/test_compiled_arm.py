@@ -54,6 +54,7 @@ def test_compiled_code_finds_the_same_to_the_bit():
         answer = way.stays_clear(boxes), way.hits(obstacles)
         assert (other.stays_clear(boxes), other.hits(obstacles)) == answer
         assert other.deepest_penetration(obstacles) == way.deepest_penetration(obstacles)
+        assert other.drives() == way.drives()
         answers.append(answer)
     assert {clear for clear, _ in answers} == {hit for _, hit in answers} == {True, False}
 

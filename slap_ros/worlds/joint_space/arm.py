@@ -15,6 +15,7 @@ from typing import NamedTuple, Protocol, Self, TypeVar
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY, Pose, Quaternion, Vector
 from slap_ros.tiered_function import TieredFunction
+from slap_ros.worlds.joint_space.drive import Drive
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
 from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.panda import HAND, link_poses
@@ -67,6 +68,10 @@ class Way(Protocol):
         self, obstacles: Surroundings[Obstacle], held_depth: float = HELD_DEPTH
     ) -> Penetration | None:
         """See :meth:`Sweep.deepest_penetration`."""
+        ...
+
+    def drives(self) -> list[Drive]:
+        """See :meth:`Sweep.drives`."""
         ...
 
 
@@ -285,12 +290,13 @@ class Sweep:
                     point = min(self.end.box(link).corners(), key=lambda corner: corner[2])
                     depth = top - core - point[2]
                     if depth > 0.0 and (found is None or depth > found.depth):
-                        found = Penetration(self._carrier(link), point, depth)
+                        found = Penetration(carrier(link), point, depth)
         return found
 
-    def _carrier(self, link: int) -> int:
-        """Which of the robot's links a link is, or is held by."""
-        return LINK_SHAPES[link].link if link < len(LINK_SHAPES) else HAND
+    def drives(self) -> list[Drive]:
+        """How each link moves on this way, the held body last."""
+        ways = zip(self.start.links, self.end.links, strict=True)
+        return [Drive.between(start, end) for start, end in ways]
 
     def _enters(self, link: int, box: OrientedBox, depth: float) -> bool:
         core = box.shrunk(depth)
@@ -308,6 +314,11 @@ class Sweep:
         px, py, pz = (a + part * (b - a) for a, b in zip(p, u, strict=True))
         pose = Pose((px, py, pz), (x / length, y / length, z / length, w / length))
         return self.start.box_at(link, pose)
+
+
+def carrier(link: int) -> int:
+    """Which of the robot's links a link is, or is held by: an index in ``panda.LINKS``."""
+    return LINK_SHAPES[link].link if link < len(LINK_SHAPES) else HAND
 
 
 def _depth(link: int) -> float:

@@ -15,12 +15,12 @@ from slap_ros.relational.state import Array
 from slap_ros.worlds.joint_space import kernels
 from slap_ros.worlds.joint_space.arm import (
     HELD_DEPTH,
-    Arm,
     Obstacle,
     Penetration,
     Surroundings,
-    Sweep,
+    carrier,
 )
+from slap_ros.worlds.joint_space.drive import Drive
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
 from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.layout_index import pose_of
@@ -37,7 +37,6 @@ class CompiledArm:
         grasp: Pose = IDENTITY,
     ) -> None:
         """See :meth:`slap_ros.worlds.joint_space.arm.Arm.at`."""
-        self._given = joints, finger, held, grasp
         self.boxes = _link_boxes(held)
         grasp_row = np.array((*grasp.position, *grasp.quaternion))
         self.rows = kernels.place(np.array(joints), finger, grasp_row, self.boxes)
@@ -55,11 +54,6 @@ class CompiledArm:
     def to(self, end: CompiledArm) -> CompiledSweep:
         """See :meth:`slap_ros.worlds.joint_space.arm.Arm.to`."""
         return CompiledSweep(self, end)
-
-    @cached_property
-    def plain(self) -> Arm:
-        """The same arm, for what is rarely asked."""
-        return Arm.at(*self._given)
 
 
 class CompiledSweep:
@@ -81,8 +75,18 @@ class CompiledSweep:
         self, obstacles: Surroundings[Obstacle], held_depth: float = HELD_DEPTH
     ) -> Penetration | None:
         """See :meth:`slap_ros.worlds.joint_space.arm.Sweep.deepest_penetration`."""
-        plain = Sweep(self.start.plain, self.end.plain)
-        return plain.deepest_penetration(obstacles, held_depth)
+        link, point, depth = kernels.deepest(
+            self.start.rows, self.end.rows, self.end.boxes, _obstacle_rows(obstacles), held_depth
+        )
+        return None if link < 0 else Penetration(carrier(link), point, depth)
+
+    def drives(self) -> list[Drive]:
+        """See :meth:`slap_ros.worlds.joint_space.arm.Sweep.drives`."""
+        velocities = kernels.velocities(self.start.rows, self.end.rows).tolist()
+        return [
+            Drive(start, (vx, vy, vz), (wx, wy, wz))
+            for start, (vx, vy, vz, wx, wy, wz) in zip(self.start.links, velocities, strict=True)
+        ]
 
 
 @lru_cache(maxsize=256)

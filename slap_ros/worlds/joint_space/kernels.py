@@ -26,8 +26,10 @@ from slap_ros.worlds.joint_space.arm import (
     SAMPLING,
     SPACINGS,
 )
+from slap_ros.worlds.joint_space.drive import LEAST_SINE
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
 from slap_ros.worlds.panda import (
+    CONTROL_PERIOD_S,
     FINGER_HEIGHT,
     HALF_TURN_Z,
     HAND,
@@ -345,3 +347,79 @@ def _edges_separate(
             if abs(ax * x + ay * y + az * z) > reach:
                 return True
     return False
+
+
+@compiled
+def deepest(
+    start: Array, end: Array, links: LinkBoxes, obstacles: BoxRows, held_depth: float
+) -> tuple[int, Vector, float]:
+    """Where the arm would be deepest in an obstacle, seen from above.
+
+    Args:
+        start: Arm at the beginning, shape (links, 14).
+        end: Arm at the end, of the same shape.
+        links: Boxes around the links.
+        obstacles: Fixed bodies.
+        held_depth: How far a held body may reach into one, m.
+
+    Returns:
+        The link, a point of it, m, and by how much it has to be raised, m; no link, -1, where the
+        arm is in no obstacle.
+    """
+    deepest_link, point, most = -1, (0.0, 0.0, 0.0), 0.0
+    for i in range(len(start)):
+        travel = _travel(start[i], end[i], links.radii[i])
+        centre, reach = _vector(end[i, 7:]), links.radii[i] + travel
+        frame, own = _pose(links.frames[i]), _vector(links.halves[i])
+        depth = held_depth if i == HELD else LINK_DEPTH
+        for j in range(len(obstacles.radii)):
+            box, half = _pose(obstacles.poses[j]), _vector(obstacles.halves[j])
+            if not _is_near(box, half, centre, reach):
+                continue
+            samples = max(math.ceil(travel / max(2.0 * min(half), SAMPLING)), 1)
+            if _enters(start[i], end[i], samples, (box, _shrunk(half, depth)), (frame, own)):
+                lowest = _lowest_corner(_pose(end[i, 7:]), own)
+                below = obstacles.tops[j] - depth - lowest[2]
+                if below > most:
+                    deepest_link, point, most = i, lowest, below
+    return deepest_link, point, most
+
+
+@inner
+def _lowest_corner(box: PlainPose, half: Vector) -> Vector:
+    """The first of the lowest corners, in the order of :meth:`OrientedBox.corners`."""
+    x, y, z = half
+    lowest = _apply(box, (-x, -y, -z))
+    for a in (-x, x):
+        for b in (-y, y):
+            for c in (-z, z):
+                corner = _apply(box, (a, b, c))
+                if corner[2] < lowest[2]:
+                    lowest = corner
+    return lowest
+
+
+@compiled
+def velocities(start: Array, end: Array) -> Array:
+    """The velocities of links that go from one pose to another in a control period.
+
+    Args:
+        start: Arm at the beginning, shape (links, 14).
+        end: Arm at the end, of the same shape.
+
+    Returns:
+        Linear velocity in m/s and angular velocity in rad/s of each link, shape (links, 6).
+    """
+    found = np.empty((len(start), 6))
+    for i in range(len(start)):
+        (a, p), (b, q) = _pose(start[i]), _pose(end[i])
+        x, y, z, w = multiply(q, conjugate(p))
+        sine = math.sqrt(x * x + y * y + z * z)
+        rate = 0.0
+        if not sine < LEAST_SINE:
+            rate = 2.0 * math.atan2(sine, abs(w)) / sine / CONTROL_PERIOD_S
+        rate = math.copysign(rate, w)
+        for axis in range(3):
+            found[i, axis] = (b[axis] - a[axis]) / CONTROL_PERIOD_S
+        found[i, 3], found[i, 4], found[i, 5] = x * rate, y * rate, z * rate
+    return found

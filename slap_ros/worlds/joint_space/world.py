@@ -33,7 +33,7 @@ from slap_ros.worlds.joint_space.raising import (
     within_limits,
 )
 from slap_ros.worlds.joint_space.scene import Scene
-from slap_ros.worlds.joint_space.simulation import Drive, Stepping
+from slap_ros.worlds.joint_space.simulation import Stepping
 from slap_ros.worlds.joint_space.simulation_pool import acquire, release
 from slap_ros.worlds.joint_space.snapshot import SceneIndex, Snapshot
 from slap_ros.worlds.joint_space.validation import require_valid
@@ -232,9 +232,7 @@ class PandaWorld(SimulatedWorld[Scene]):
         bodies, depth = list(now.bodies), 0.0
         loose = [i for i in range(len(bodies)) if i != now.held]
         if not self._undisturbed(now, loose, sweep):
-            ways = zip(sweep.start.links, sweep.end.links, strict=True)
-            drives = [Drive.between(start, end) for start, end in ways]
-            after = self._simulation.run(bodies, now.held, drives)
+            after = self._simulation.run(bodies, now.held, sweep.drives())
             depth = self._simulation.deepest()
             came_to_rest = all(_rests(bodies[i], after[i]) for i in loose)
             for i in loose:
