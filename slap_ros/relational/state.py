@@ -212,8 +212,7 @@ class State:
 
     def gather(self, column: Column, features: tuple[str, ...]) -> Array:
         """Several features of several objects, shape (..., objects, features)."""
-        gathered: Array = self.data[..., self.layout.grid(column, features)]
-        return gathered
+        return self.data.take(self.layout.grid(column, features), axis=-1)
 
     def replace(self, changes: Mapping[tuple[Object, str], float]) -> State:
         """The same state with some features changed."""

@@ -22,7 +22,7 @@ def is_free(q: Joints, scene: CollisionScene) -> bool:
     """Whether a configuration is free: rad, shape (7,)."""
     frames = np.empty((JOINTS, 3, 4))
     place_links(q, frames)
-    for shape in range(len(scene.links)):
+    for shape in range(len(scene.links) - 1, -1, -1):  # the hand, which mostly collides first
         link, inside = frames[scene.links[shape]], scene.frames[shape]
         centre = _moved(link, inside, 0), _moved(link, inside, 1), _moved(link, inside, 2)
         for obstacle in range(len(scene.sizes)):
