@@ -47,19 +47,24 @@ class PlanningScene:
         Returns:
             A checker with the held body in the hand and the fingers where they are.
         """
-        held = held_body(state)
-        obstacles = [
-            box for thing, box in _solid(self, state) if thing != held and thing not in touched
-        ]
-        return CollisionChecker(
-            obstacles,
-            held=None if held is None else self._in_hand(state, held),
-            finger=finger_of(state),
-            held_margin=held_margin,
-        )
+        return _checker(self, state, touched, held_margin)
 
-    def _in_hand(self, state: State, held: Object) -> OrientedBox:
-        return self.carried(state, held).at(grasp_of(state))
+
+@memoized
+def _checker(
+    scene: PlanningScene, state: State, touched: tuple[Object, ...], held_margin: float
+) -> CollisionChecker:
+    """See :meth:`PlanningScene.checker`: ways to several places on a table have the same."""
+    held = held_body(state)
+    obstacles = [
+        box for thing, box in _solid(scene, state) if thing != held and thing not in touched
+    ]
+    return CollisionChecker(
+        obstacles,
+        held=None if held is None else scene.carried(state, held).at(grasp_of(state)),
+        finger=finger_of(state),
+        held_margin=held_margin,
+    )
 
 
 @memoized

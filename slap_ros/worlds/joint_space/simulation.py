@@ -96,7 +96,9 @@ class Simulation:
         }
         self._held_proxy_frictions = dict.fromkeys(shapes, REFERENCE_FRICTION)
         self._driven = [*self._links, *self._held_proxies.values()]
-        self._parking = {body: _parking(i) for i, body in enumerate([*self._free, *self._driven])}
+        parking = [_parking(i) for i in range(len(self._free) + len(self._driven))]
+        self._free_parking = list(zip(self._free, parking, strict=False))
+        self._driven_parking = list(zip(self._driven, parking[len(self._free) :], strict=True))
 
     def close(self) -> None:
         """Give the client back."""
@@ -173,14 +175,13 @@ class Simulation:
         setting a pose leaves as it was, becomes a function of the orientation.
         """
         client = self.client
-        for body, motion in zip(self._free, bodies, strict=True):
-            pybullet.resetBasePositionAndOrientation(
-                body, self._parking[body], motion.pose.quaternion, client
-            )
-            pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
-        for body in self._driven:
-            pybullet.resetBasePositionAndOrientation(body, self._parking[body], NO_ROTATION, client)
-            pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
+        place, move = pybullet.resetBasePositionAndOrientation, pybullet.resetBaseVelocity
+        for (body, parking), motion in zip(self._free_parking, bodies, strict=True):
+            place(body, parking, motion.pose.quaternion, client)
+            move(body, ORIGIN, ORIGIN, client)
+        for body, parking in self._driven_parking:
+            place(body, parking, NO_ROTATION, client)
+            move(body, ORIGIN, ORIGIN, client)
         self._advance(0)
 
     def _advance(self, substeps: int) -> None:
