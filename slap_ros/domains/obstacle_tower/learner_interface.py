@@ -22,6 +22,7 @@ from slap_ros.domains.obstacle_tower.predicates import (
 from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.observation import Features, joined
 from slap_ros.relational import Column, GroundAtom, Object, State
+from slap_ros.relational.predicates import cache_latest
 from slap_ros.relational.state import Array
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE, TABLE_TOP
@@ -100,6 +101,7 @@ def _of_nearest(off: Array, *others: Array) -> list[Array]:
     return [np.take_along_axis(values, nearest, axis=-2)[..., 0, :] for values in (off, *others)]
 
 
+@cache_latest
 def _targets(state: State) -> Column:
     """The targets, or any surface where there is none; they stay so: one state of a batch tells."""
     surfaces = state.layout.column_of(SURFACE)

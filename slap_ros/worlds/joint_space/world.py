@@ -9,8 +9,7 @@ action, bit for bit (``docs/physics.md`` says how, and what it costs).
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -58,11 +57,13 @@ JAM_LIMIT = 0.02  # m, where no body moves: between two immovable ones the solve
 CACHE_SIZE = 256  # arrangements of bodies of which it is known whether they are stable
 
 
-class _Arrangement(NamedTuple):
-    """Free bodies without velocity that are not held."""
+@dataclass(eq=False, slots=True)
+class _Arrangement:
+    """Free bodies without velocity that are not held, among fixed ones."""
 
-    poses: tuple[tuple[int, Pose], ...]  # each with its index
-    boxes: Surroundings[OrientedBox]
+    poses: tuple[tuple[int, Pose], ...] = ()  # each with its index
+    boxes: Surroundings[OrientedBox] = field(default_factory=Surroundings)
+    stable: bool | None = None  # None: nobody has asked
 
 
 class PandaWorld(SimulatedWorld[Scene]):
@@ -94,7 +95,6 @@ class PandaWorld(SimulatedWorld[Scene]):
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
         self._fixed_poses: tuple[Pose, ...] = ()
         self._obstacles: Surroundings[Obstacle] = Surroundings()
-        self._arrangement = _Arrangement((), Surroundings())
         self._adopt(state)
         self._simulation = acquire(scene, stepping)
         self._give_back(self._simulation, release)
@@ -127,6 +127,7 @@ class PandaWorld(SimulatedWorld[Scene]):
         self._state, self._snapshot, self._posture = state, snapshot, arm
         self._fixed_poses, self._materials = poses, materials
         self._obstacles = obstacles
+        self._arrangement = _Arrangement()
 
     def _obstacles_at(self, poses: tuple[Pose, ...]) -> Surroundings[Obstacle]:
         """The solid fixed bodies, which mostly stand where they stood before."""
@@ -254,7 +255,11 @@ class PandaWorld(SimulatedWorld[Scene]):
         if not all(bodies[i].still for i in loose):
             return False
         arrangement = self._arrangement_at(tuple([(i, bodies[i].pose) for i in loose]))
-        return sweep.stays_clear(arrangement.boxes) and self._stable(now, loose)
+        if not sweep.stays_clear(arrangement.boxes):
+            return False
+        if arrangement.stable is None:
+            arrangement.stable = self._stable(now, loose)
+        return arrangement.stable
 
     def _arrangement_at(self, poses: tuple[tuple[int, Pose], ...]) -> _Arrangement:
         """The boxes around free bodies, which mostly stand where they stood before."""
