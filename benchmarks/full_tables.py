@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.printing import show
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
-from slap_ros.domains.tabletop.transit import clear_caches
+from slap_ros.domains.tabletop.memory import clear_caches
 from slap_ros.errors import PlanningLimitError
 from slap_ros.planning.anytime import AnytimePlanner
 from slap_ros.planning.plan import PlanningResult

@@ -128,7 +128,7 @@ def measure_kernels(backend: Backend) -> dict[str, float]:
         "shortening": lambda: space.shorten(tree, rng(), SHORTENING_TRIES, RESOLUTION),
         "pruning": lambda: space.straighten(tree, RESOLUTION),
         "four grasps": lambda: space.nearest_configurations(targets, start),
-        "straight up": lambda: backend.linear_rows(start, lift, 4),
+        "straight up": lambda: backend.linear_rows(start, grasp_pose(start), lift, 4),
     }
     for call in calls.values():
         call()  # loads it

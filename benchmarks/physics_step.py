@@ -32,6 +32,7 @@ from slap_ros.relational import Object, State, Type
 from slap_ros.worlds.bullet import PANDA, pybullet
 from slap_ros.worlds.features import BODY_FEATURES, body_features
 from slap_ros.worlds.joint_space.arm import Arm
+from slap_ros.worlds.joint_space.drive import Drive
 from slap_ros.worlds.joint_space.features import ROBOT, robot_features
 from slap_ros.worlds.joint_space.scene import (
     CUBE_EDGE,
@@ -42,7 +43,7 @@ from slap_ros.worlds.joint_space.scene import (
     Scene,
     cube,
 )
-from slap_ros.worlds.joint_space.simulation import Drive, Simulation, Stepping
+from slap_ros.worlds.joint_space.simulation import Simulation, Stepping
 from slap_ros.worlds.joint_space.snapshot import SceneIndex
 from slap_ros.worlds.joint_space.world import ACTION_SPACE, STEPPING, PandaWorld
 from slap_ros.worlds.layout_index import BodyState

@@ -16,7 +16,7 @@ from time import process_time
 from benchmarks.printing import show
 from slap_ros.acquisition.curriculum.rollouts import plan_operators
 from slap_ros.domains import get_domain
-from slap_ros.domains.tabletop.transit import clear_caches
+from slap_ros.domains.tabletop.memory import clear_caches
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.planner import make_planner
 

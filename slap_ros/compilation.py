@@ -39,10 +39,18 @@ SOURCES = (
     "policies/kernels.py",
     "domains/classifiers.py",
     "domains/obstacle2d/kernels.py",
+    "domains/obstacle_tower/kernels.py",
+    "domains/obstacle_tower/support.py",
     "shortcuts/kernels.py",
     "portable_math.py",
     "geometry/box_separation.py",
+    "geometry/oriented_box.py",
+    "geometry/pose.py",
     "worlds/panda.py",
+    "worlds/joint_space/arm.py",
+    "worlds/joint_space/drive.py",
+    "worlds/joint_space/kernels.py",
+    "worlds/joint_space/links.py",
 )
 _config: Any = numba.config
 logger = logging.getLogger(__name__)

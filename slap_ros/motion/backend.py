@@ -30,7 +30,7 @@ class Backend(Protocol):
         """The configurations that are free in a scene."""
         ...
 
-    def linear_rows(self, q: Joints, target: Pose, count: int) -> Path | None:
+    def linear_rows(self, q: Joints, start: Pose, target: Pose, count: int) -> Path | None:
         """See :func:`slap_ros.motion.linear.linear_rows`."""
         ...
 

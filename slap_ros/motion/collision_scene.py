@@ -20,6 +20,8 @@ from slap_ros.motion.joints import Array
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, LAST_LINK, matrix
 from slap_ros.worlds.panda import JOINTS, LINKS, link_poses
 
+SURELY = 1.0 + 1e-9  # times a squared distance: no rounding comes near it
+
 
 class MovingShapes(NamedTuple):
     """Boxes, each fixed to one of link 1 to link 7, with what is to be kept clear around them."""
@@ -41,6 +43,8 @@ class CollisionScene(NamedTuple):
     sizes: Array  # half the obstacles' edges, m, shape (o, 3)
     origins: Array  # the base's origin seen from the obstacles, negated, m, shape (o, 3)
     reaches2: Array  # squared distance, m², from a shape's centre to a box it may touch: (s, o)
+    middles: Array  # centres of the obstacles, m, shape (o, 3)
+    far2: Array  # squared distance, m², from centre to centre, from which on that is ruled out
 
     def digest(self) -> bytes:
         """Equal for equal scenes."""
@@ -60,16 +64,35 @@ def make_scene(
         obstacles: Boxes to keep clear of, in the base's frame.
         base: Whether the arm's base is in the way of forearm, hand and held box.
     """
-    boxes = [*obstacles, BASE] if base else list(obstacles)
+    boxes = _obstacle_boxes((*obstacles, BASE) if base else tuple(obstacles))
+    reaches = np.sqrt(dot(shapes.halves, shapes.halves)) + shapes.clearances
+    reaches2 = np.repeat(reaches[:, None] ** 2, len(boxes.sizes), axis=1)
+    if base:
+        reaches2[:BEHIND_ELBOW, -1] = 0.0  # never tested: these are fixed to it
+    far2 = (np.sqrt(reaches2) + boxes.radii) ** 2 * SURELY
+    placed = boxes.turns, boxes.sizes, boxes.origins
+    return CollisionScene(*shapes, *placed, reaches2, boxes.middles, far2)
+
+
+class _ObstacleBoxes(NamedTuple):
+    """Fixed boxes, as :class:`CollisionScene` has them."""
+
+    turns: Array
+    sizes: Array
+    origins: Array
+    middles: Array
+    radii: Array  # half their diagonals, m, shape (o,)
+
+
+@lru_cache(maxsize=256)  # as those that follow
+def _obstacle_boxes(boxes: tuple[OrientedBox, ...]) -> _ObstacleBoxes:
+    """The arrays of obstacles: several checkers of a state have the same."""
     poses = np.array([_frame(box.pose) for box in boxes]).reshape(-1, 4, 4)
     turns = np.ascontiguousarray(poses[:, :3, :3])
     sizes = np.array([box.half for box in boxes]).reshape(-1, 3)
     origins = dot(turns.swapaxes(1, 2), poses[:, None, :3, 3])
-    reaches = np.sqrt(dot(shapes.halves, shapes.halves)) + shapes.clearances
-    reaches2 = np.repeat(reaches[:, None] ** 2, len(boxes), axis=1)
-    if base:
-        reaches2[:BEHIND_ELBOW, -1] = 0.0  # never tested: these are fixed to it
-    return CollisionScene(*shapes, turns, sizes, origins, reaches2)
+    middles = np.ascontiguousarray(poses[:, :3, 3])
+    return _ObstacleBoxes(turns, sizes, origins, middles, np.sqrt(dot(sizes, sizes)))
 
 
 @lru_cache(maxsize=256)  # of many states; nobody changes the arrays

@@ -54,7 +54,8 @@ def nearest_configurations(
     space = _everywhere() if free is None else free_space(free)
     frames = np.array([matrix(target) for target in targets]).reshape(-1, 4, 4)
     found = space.nearest_configurations(frames, configuration(near))
-    return [q if np.isfinite(q).all() else None for q in found]
+    reached = np.atleast_1d(np.isfinite(found).all(axis=-1))
+    return [q if is_reached else None for q, is_reached in zip(found, reached, strict=True)]
 
 
 def ik_candidates(target: Pose, near: Joints) -> Joints:

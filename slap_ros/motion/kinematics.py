@@ -18,10 +18,8 @@ LAST_LINK = JOINTS  # link 7, which carries the hand
 
 def matrix(pose: Pose) -> Array:
     """The pose as a homogeneous transform, shape (4, 4), lengths in m."""
-    transform = np.eye(4)
-    transform[:3, :3] = rotation_matrix(pose.quaternion)
-    transform[:3, 3] = pose.position
-    return transform
+    rows = zip(rotation_matrix(pose.quaternion), pose.position, strict=True)
+    return np.array([*((*turn, place) for turn, place in rows), (0.0, 0.0, 0.0, 1.0)])
 
 
 _ZERO = link_poses((0.0,) * JOINTS, 0.0)

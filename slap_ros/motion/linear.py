@@ -67,21 +67,22 @@ def linear_motion(
     start = grasp_pose(q)
     parts = (math.dist(start.position, target.position) / increment, _angle(start, target))
     count = max(1, math.ceil(max(parts) - 1e-9))
-    rows = backend().linear_rows(q, target, count)
+    rows = backend().linear_rows(q, start, target, count)
     if rows is None or (free is not None and not free_space(free).path_is_free(rows, resolution)):
         return None
     return rows
 
 
-def linear_rows(q: Joints, target: Pose, count: int) -> Path | None:
+def linear_rows(q: Joints, start: Pose, target: Pose, count: int) -> Path | None:
     """The path of :func:`linear_motion`, whatever is in its way, by Python.
 
     Args:
         q: Configuration to start from, rad, shape (7,).
+        start: Pose of the grasp point there.
         target: Pose of the grasp point in the base's frame.
         count: Number of increments.
     """
-    start, path = grasp_pose(q), [q]
+    path = [q]
     for i in range(1, count + 1):
         following = _rows(path[-1], start, target, ((i - 1) / count, i / count), HALVINGS)
         if following is None:

@@ -26,6 +26,6 @@ class NumpyBackend:
         """See :meth:`slap_ros.motion.backend.Backend.free_space`."""
         return NumpyFreeSpace(partial(free_flags, scene))
 
-    def linear_rows(self, q: Joints, target: Pose, count: int) -> Path | None:
+    def linear_rows(self, q: Joints, start: Pose, target: Pose, count: int) -> Path | None:
         """See :meth:`slap_ros.motion.backend.Backend.linear_rows`."""
-        return linear_rows(q, target, count)
+        return linear_rows(q, start, target, count)

@@ -47,6 +47,7 @@ ELBOW_MIDDLE = float(arctan2(np.array(_SINE), np.array(_COSINE)))  # rad
 SWEEP = 64  # values of joint 7 over its range
 SPACING = (HIGH[6] - LOW[6]) / (SWEEP - 1)  # rad, between two of them
 AROUND = np.linspace(-SPACING, SPACING, 33)  # rad, from the best of the sweep
+_SWEPT = np.linspace(LOW[6], HIGH[6], SWEEP)  # rad
 _FREE_BATCH = 16  # candidates that are checked for collisions together
 UPRIGHT = 1e-9  # sine of joint 2, below which joints 1 and 3 turn about the same axis
 
@@ -82,7 +83,7 @@ def nearest_configurations(targets: Array, near: Joints, free: Free) -> Joints:
 
 def sweep(near: Joints) -> Array:
     """Values of joint 7 over its range, and its present one: shape (SWEEP + 1,)."""
-    return np.append(np.linspace(LOW[6], HIGH[6], SWEEP), near[6])
+    return np.concatenate([_SWEPT, near[6:]])
 
 
 def _around(best: Joints | None) -> Array:

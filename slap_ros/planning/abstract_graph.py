@@ -247,7 +247,11 @@ class _BreadthFirstSearch:
                 operators.
             length: See ``heuristic``.
         """
-        self._goal, self._operators, self._max_nodes = goal, operators, max_nodes
+        self._goal, self._max_nodes = goal, max_nodes
+        self._masks = [  # calls of operators, in each abstract state, took most of the time
+            (ground.preconditions, ground.delete_effects, ground.add_effects, option)
+            for ground, option in operators
+        ]
         self._heuristic, self._length = heuristic, length
         self.pruned = False  # whether anything was
 
@@ -277,10 +281,10 @@ class _BreadthFirstSearch:
             abstract, depth = graph.nodes[source], graph.depth[source] + 1
             if self._is_goal(abstract):
                 continue
-            for operator, option in self._operators:
-                if not operator.applicable(abstract):
+            for required, deleted, added, option in self._masks:
+                if abstract & required != required:
                     continue
-                successor = operator.apply(abstract)
+                successor = abstract & ~deleted | added
                 if successor == abstract:
                     continue
                 if successor not in index:

@@ -29,7 +29,7 @@ from slap_ros.planning.effort import Effort
 from slap_ros.planning.ff_planner import FFPlanner
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
-from slap_ros.planning.lazy_search import SearchLimits, search_lazily
+from slap_ros.planning.lazy_search import LookAhead, SearchLimits, search_lazily
 from slap_ros.planning.model import CountedModel
 from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.planning.planner_choice import ANYTIME
@@ -165,9 +165,10 @@ class _Improvement:
             if self._best is None:
                 self._limit += self._model.executed  # what was tried in vain
         add_shortcuts(graph)
+        ahead = LookAhead.of(graph)
         leads_to_goal = self._is_through(graph)
         for weight, rollouts in [(1.0, None)] if is_small else SEARCHES:
-            outcome = self._search(graph, weight, rollouts)
+            outcome = self._search(graph, ahead, weight, rollouts)
             leads_to_goal |= outcome.plan is not None
             if leads_to_goal:  # else a deeper graph may have a plan that is shorter
                 self._at_least = max(self._at_least, outcome.at_least or 0)
@@ -206,8 +207,9 @@ class _Improvement:
         searched: Plan | None = None
         while True:
             graph = builder.around(route)
+            ahead = LookAhead.of(graph)
             for weight in WEIGHTS:
-                if self._take(self._search(graph, weight).plan):
+                if self._take(self._search(graph, ahead, weight).plan):
                     yield self._result(graph)
             if self._best in (None, searched) or self._model.executed >= self._limit:
                 return
@@ -235,7 +237,11 @@ class _Improvement:
         return first
 
     def _search(
-        self, graph: AbstractGraph, weight: float, rollouts: int | None = None
+        self,
+        graph: AbstractGraph,
+        ahead: LookAhead,
+        weight: float,
+        rollouts: int | None = None,
     ) -> SearchOutcome:
         below = None if self._best is None else self._best.predicted_steps
         most = (
@@ -243,7 +249,7 @@ class _Improvement:
         )
         limits = SearchLimits(weight, most, below)
         self._forget_failures()  # of searches that tried shortcuts elsewhere
-        return search_lazily(graph, self._state, self._model, limits)
+        return search_lazily(graph, self._state, self._model, limits, ahead)
 
     def _take(self, plan: Plan | None) -> bool:
         """Keep a plan that is shorter than the best; whether it was."""

@@ -16,7 +16,7 @@ is as if the edge had been rolled out when it first came to the front.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 
@@ -47,8 +47,44 @@ class SearchLimits:
 UNLIMITED = SearchLimits()
 
 
+@dataclass(frozen=True)
+class LookAhead:
+    """What leads to a goal in a graph: the same for every search in it.
+
+    Args:
+        goals: Indices of the goal nodes.
+        forward: Edges out of each node through which a goal can be reached.
+        steps_to_go: Lower bound of the steps from each node to a goal; None without a way.
+    """
+
+    goals: frozenset[int]
+    forward: Sequence[Sequence[Edge]]
+    steps_to_go: Sequence[int | None]
+
+    @classmethod
+    def of(cls, graph: AbstractGraph) -> LookAhead:
+        """Along all forward edges of a graph."""
+        return cls.along(graph.forward_edges(), frozenset(graph.goal_nodes))
+
+    @classmethod
+    def along(cls, edges: Sequence[Sequence[Edge]], goals: frozenset[int]) -> LookAhead:
+        """Along these edges out of each node, to these goal nodes."""
+        steps_to_go = _steps_to_go(edges, goals)
+        leading = [[e for e in out if steps_to_go[e.target] is not None] for out in edges]
+        return cls(goals, leading, steps_to_go)
+
+    def without_given_up(self) -> LookAhead:
+        """The same without the options that were given up, and the bounds that counted on them."""
+        left = [[e for e in out if not e.option.given_up()] for out in self.forward]
+        return LookAhead.along(left, self.goals)
+
+
 def search_lazily(
-    graph: AbstractGraph, state: State, model: Model, limits: SearchLimits = UNLIMITED
+    graph: AbstractGraph,
+    state: State,
+    model: Model,
+    limits: SearchLimits = UNLIMITED,
+    ahead: LookAhead | None = None,
 ) -> SearchOutcome:
     """A* with lazy edge evaluation: an edge is rolled out at the front of the queue.
 
@@ -61,12 +97,13 @@ def search_lazily(
         state: The low-level state to start from, in the graph's first node.
         model: Rolls options out.
         limits: Weight of the heuristic, and where to stop.
+        ahead: What leads to a goal in the graph, where that is known.
 
     Returns:
         A plan, of least cost where bounds are admissible and the weight is 1, if any path of the
         graph can be executed from ``state`` within the limits.
     """
-    return _LazySearch(graph, state, model, limits).run()
+    return _LazySearch(graph, state, model, limits, ahead or LookAhead.of(graph)).run()
 
 
 @dataclass(order=True)
@@ -90,9 +127,8 @@ class _QueueEntry:
 class _Frontier:
     """The queue of A*; h is a lower bound of the steps to go from a node."""
 
-    def __init__(self, graph: AbstractGraph, weight: float) -> None:
-        self._goals, self._weight = graph.goal_nodes, weight
-        self._look_ahead(graph.forward_edges())
+    def __init__(self, ahead: LookAhead, weight: float) -> None:
+        self._ahead, self._weight = ahead, weight
         self._queue: list[_QueueEntry] = []
         self._tie = count()
 
@@ -131,7 +167,7 @@ class _Frontier:
         self._put(entry)
 
     def _put(self, entry: _QueueEntry) -> None:
-        h = self._h[entry.node]
+        h = self._ahead.steps_to_go[entry.node]
         if h is not None:
             rolled_out = entry.least_steps if entry.ties else 0  # without success
             so_far, to_come = entry.vertex.g + rolled_out, entry.least_steps - rolled_out + h
@@ -143,7 +179,7 @@ class _Frontier:
         """The best entry; None if the queue is empty."""
         while self._queue:
             best = heapq.heappop(self._queue)
-            h = self._h[best.node]
+            h = self._ahead.steps_to_go[best.node]
             if h is not None and best.vertex.g + best.least_steps + h <= best.f:
                 return best
             self._put(best)  # bounds rose since it was pushed
@@ -153,26 +189,30 @@ class _Frontier:
         """All entries, in no order."""
         return self._queue
 
+    def edges_from(self, node: int) -> Sequence[Edge]:
+        """The edges out of a node through which a goal can be reached."""
+        return self._ahead.forward[node]
+
     def drop_given_up(self) -> None:
         """Drop the options that were given up, with the bounds that counted on them."""
-        self._look_ahead([[e for e in out if not e.option.given_up()] for out in self.forward])
-
-    def _look_ahead(self, forward: list[list[Edge]]) -> None:
-        """Keep the edges through which a goal can be reached, and h of each node."""
-        self._h = _steps_to_go(forward, self._goals)
-        self.forward = [[e for e in out if self._h[e.target] is not None] for out in forward]
+        self._ahead = self._ahead.without_given_up()
 
 
 class _LazySearch:
     """One run of :func:`search_lazily`."""
 
     def __init__(
-        self, graph: AbstractGraph, state: State, model: Model, limits: SearchLimits
+        self,
+        graph: AbstractGraph,
+        state: State,
+        model: Model,
+        limits: SearchLimits,
+        ahead: LookAhead,
     ) -> None:
         """See :func:`search_lazily`."""
         self._graph, self._model, self._limits = graph, model, limits
-        self._goals = set(graph.goal_nodes)
-        self._frontier = _Frontier(graph, limits.weight)
+        self._goals = ahead.goals
+        self._frontier = _Frontier(ahead, limits.weight)
         start = Vertex(0, state, 0)
         self._cheapest = {start.key: 0}
         self._failures = Failures()
@@ -229,7 +269,7 @@ class _LazySearch:
 
     def _expand(self, vertex: Vertex) -> None:
         """Queue the edges out of a vertex, each with its bound."""
-        for edge in self._frontier.forward[vertex.node]:
+        for edge in self._frontier.edges_from(vertex.node):
             skill = edge.option.skill
             bound = skill.lower_bound(vertex.state, edge.option.objects)
             self._frontier.push(vertex, edge, max(skill.least_steps, bound))
@@ -273,7 +313,7 @@ class _LazySearch:
             self._frontier.drop_given_up()
 
 
-def _steps_to_go(edges: Sequence[Sequence[Edge]], goals: Sequence[int]) -> list[int | None]:
+def _steps_to_go(edges: Sequence[Sequence[Edge]], goals: Iterable[int]) -> list[int | None]:
     """Lower bound of the steps from each node to a goal, by Dijkstra; None without a way.
 
     Args:

@@ -82,6 +82,10 @@ class Option:
             return Target.exactly(expected)
         return Target(expected, self.deletes & ~expected)
 
+    def __hash__(self) -> int:
+        # Skills of a task differ in their names, and options are looked up again and again.
+        return hash((self.skill.name, self.objects, self.attempt))
+
     def __str__(self) -> str:
         return f"{self.skill.name}({', '.join(obj.name for obj in self.objects)})"
 

@@ -109,7 +109,8 @@ class Layout:
     def column_of(self, wanted: Type) -> Column:
         """The objects of a type, or of one below it, as a column; always the same one."""
         if wanted not in self._by_type:
-            self._by_type[wanted] = Column(self.of_type(wanted))
+            found = tuple(obj for obj in self.objects if obj.type.is_a(wanted))
+            self._by_type[wanted] = Column(found)
         return self._by_type[wanted]
 
     def object(self, name: str) -> Object:
@@ -127,7 +128,7 @@ class Layout:
 
     def of_type(self, wanted: Type) -> tuple[Object, ...]:
         """The objects of a type or of a type below it, in layout order."""
-        return tuple(obj for obj in self.objects if obj.type.is_a(wanted))
+        return self.column_of(wanted).objects
 
 
 class State:
@@ -211,8 +212,7 @@ class State:
 
     def gather(self, column: Column, features: tuple[str, ...]) -> Array:
         """Several features of several objects, shape (..., objects, features)."""
-        gathered: Array = self.data[..., self.layout.grid(column, features)]
-        return gathered
+        return self.data.take(self.layout.grid(column, features), axis=-1)
 
     def replace(self, changes: Mapping[tuple[Object, str], float]) -> State:
         """The same state with some features changed."""

@@ -13,7 +13,7 @@ from slap_ros.relational import Feature, Object, State
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.tracking import PoseEstimate
 from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
-from slap_ros.worlds.joint_space.arm import Arm, Obstacle
+from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Surroundings
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.raising import Configuration, off_fixed_bodies
 from slap_ros.worlds.joint_space.scene import Scene
@@ -93,7 +93,7 @@ class StateAssembler:
             tuple(joints),
             tuple(joints),
             lambda q: Arm.at(q, finger, held, pose),
-            [Obstacle.of(box) for box in fixed],
+            Surroundings(Obstacle.of(box) for box in fixed),
             TOO_DEEP,
         )
 

@@ -217,6 +217,7 @@ class ObservationEncoder:
             )
         ]
         self._incidence, self._placing, self._releasing = self._classify_atoms()
+        self._releases = bool(self._releasing.any())
         self._shares = self._incidence.astype(np.float64)
         self._orphans: _Orphans | None = None  # until there is a state to look at
         self._kinds = self._of_kinds()
@@ -276,6 +277,8 @@ class ObservationEncoder:
         Args:
             holds: Whether each changed atom is achieved, shape (n, atoms).
         """
+        if not self._releases:
+            return np.zeros(len(holds), dtype=bool)
         released: Bools = np.logical_or.reduce(holds[:, self._releasing], axis=-1)
         return released
 

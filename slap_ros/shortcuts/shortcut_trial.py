@@ -142,9 +142,8 @@ class RolloutBatch:
             self._worlds = self._begin()
         actions = self._act(self.steps, self._encoding)
         self._past.append((self.states, actions))
-        broken = np.isnan(actions).any(axis=-1)
-        if broken.any():  # a damaged policy may give no number
-            self._alive &= ~broken
+        if np.isnan(actions.sum()):  # a damaged policy may give no number
+            self._alive &= ~np.isnan(actions).any(axis=-1)
             actions = np.nan_to_num(actions)
         commands = self._encoder.action_map(actions.astype(np.float64))
         self.states = self._worlds.step(commands)

@@ -239,6 +239,20 @@ class Signature:
             source: Abstract state in which the shortcut would begin, a mask.
             space: Atoms of the task.
         """
+        conditions = self.conditions(change, space)
+        return conditions is not None and all(source & mask == held for mask, held in conditions)
+
+    def conditions(self, change: Change, space: AtomSpace) -> Sequence[tuple[int, int]] | None:
+        """Under which conditions on its source a change has the patterns of the signature.
+
+        Args:
+            change: Change from one abstract state to another.
+            space: Atoms of the task.
+
+        Returns:
+            Masks, each with those of its atoms that must hold in the source while its others must
+            not; None where the change does not have the patterns, whatever the source.
+        """
         kind = kinds(space)
         found: set[Pattern] = set()
         mine: set[Object] = set()
@@ -249,30 +263,28 @@ class Signature:
                 found.add(pattern)
                 mine.update(atom.objects)
             elif sign == "+":
-                return False
+                return None
             else:
                 others.update(atom.objects)
-        missing = self.patterns - found
-        return (
+        if not (
             others <= mine
             and {kind[obj] for obj in mine} == set(self.roles)
             and _signs(found) == _signs(self.patterns)
-            and all(_is_already_so(pattern, source, mine, space) for pattern in missing)
-        )
+        ):
+            return None
+        return [_already_so(pattern, mine, space) for pattern in self.patterns - found]
 
 
 def _signs(patterns: Collection[Pattern]) -> set[str]:
     return {sign for sign, _, _ in patterns}
 
 
-def _is_already_so(
-    pattern: Pattern, source: int, objects: Collection[Object], space: AtomSpace
-) -> bool:
-    """Whether all atoms of a pattern about these objects hold that are added, or none do."""
+def _already_so(pattern: Pattern, objects: Collection[Object], space: AtomSpace) -> tuple[int, int]:
+    """The atoms of a pattern about these objects, and which hold: all of them if added, or none."""
     about = [
         atom
         for atom in space.decode(instances(pattern, space))
         if set(atom.objects) <= set(objects)
     ]
     mask = space.mask(about)
-    return source & mask == (mask if pattern[0] == "+" else 0)
+    return mask, mask if pattern[0] == "+" else 0

@@ -35,6 +35,7 @@ class SignatureMatcher:
             (_fluents(name, space), name in signature.context)
             for name in sorted({*signature.context, *(p.name for p in grasping)})
         ]
+        self._conditions: dict[Change, Sequence[tuple[int, int]] | None] = {}
         kind = kinds(space)
         self._left_alone = ~space.mask(
             atom for atom in space.atoms if all(kind[o] in signature.slots for o in atom.objects)
@@ -87,8 +88,15 @@ class SignatureMatcher:
             and not add & ~self.may_be_added
             and bool(add) == self._adds_some
             and bool(delete & self._may_be_deleted) == self._deletes_some
-            and self._signature.matches(Change(add, delete), source, self._space)
+            and self._fits(Change(add, delete), source)
         )
+
+    def _fits(self, change: Change, source: int) -> bool:
+        """Whether the signature matches a change, which mostly joins many pairs of nodes."""
+        if change not in self._conditions:
+            self._conditions[change] = self._signature.conditions(change, self._space)
+        conditions = self._conditions[change]
+        return conditions is not None and all(source & mask == held for mask, held in conditions)
 
 
 def _fluents(predicate: str, space: AtomSpace) -> int:

@@ -55,9 +55,9 @@ LINKS = (
 )
 HAND = LINKS.index("hand")
 
-_HALF = math.sqrt(0.5)  # sine and cosine of an eighth turn, half of a quarter
+SQRT_HALF = math.sqrt(0.5)  # sine and cosine of an eighth turn, half of a quarter
 # Each joint's frame in the link before it: origin in m, and quarter turns about x.
-_JOINT_FRAMES: tuple[tuple[Vector, int], ...] = (
+JOINT_FRAMES: tuple[tuple[Vector, int], ...] = (
     ((0.0, 0.0, 0.333), 0),
     ((0.0, 0.0, 0.0), -1),
     ((0.0, -0.316, 0.0), 1),
@@ -66,22 +66,27 @@ _JOINT_FRAMES: tuple[tuple[Vector, int], ...] = (
     ((0.0, 0.0, 0.0), 1),
     ((0.088, 0.0, 0.0), 1),
 )
-_HAND_FRAME = Pose((0.0, 0.0, 0.107), (0.0, 0.0, -math.sin(math.pi / 8), math.cos(math.pi / 8)))
+HAND_FRAME = Pose((0.0, 0.0, 0.107), (0.0, 0.0, -math.sin(math.pi / 8), math.cos(math.pi / 8)))
 _GRASP_FRAME = Pose((0.0, 0.0, GRASP_POINT))
-_FINGER_HEIGHT = 0.0584  # m, along the hand's z
-_HALF_TURN_Z = (0.0, 0.0, 1.0, 0.0)
+FINGER_HEIGHT = 0.0584  # m, along the hand's z
+HALF_TURN_Z = (0.0, 0.0, 1.0, 0.0)
 
 
 def _arm(q: Sequence[float] | NDArray[np.float64]) -> list[Pose]:
     """Poses of link 0 to link 7."""
     position, turn = ORIGIN, NO_ROTATION
     poses = [Pose(position, turn)]
-    for angle, (origin, quarter) in zip(q, _JOINT_FRAMES, strict=True):
+    for angle, (origin, quarter) in zip(q, JOINT_FRAMES, strict=True):
         dx, dy, dz = rotate(turn, origin)
         position = (position[0] + dx, position[1] + dy, position[2] + dz)
         c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
         if quarter:
-            joint = (quarter * _HALF * c, -quarter * _HALF * s, _HALF * s, _HALF * c)
+            joint = (
+                quarter * SQRT_HALF * c,
+                -quarter * SQRT_HALF * s,
+                SQRT_HALF * s,
+                SQRT_HALF * c,
+            )
         else:
             joint = (0.0, 0.0, s, c)
         turn = multiply(turn, joint)
@@ -91,7 +96,7 @@ def _arm(q: Sequence[float] | NDArray[np.float64]) -> list[Pose]:
 
 def hand_pose(q: Sequence[float] | NDArray[np.float64]) -> Pose:
     """Pose of the hand for joint positions in rad; z points out of it, fingers move along y."""
-    return _arm(q)[-1].compose(_HAND_FRAME)
+    return _arm(q)[-1].compose(HAND_FRAME)
 
 
 def grasp_pose(q: Sequence[float] | NDArray[np.float64]) -> Pose:
@@ -117,12 +122,10 @@ def link_poses(
         A pose for each of :data:`LINKS`, in the frame of the base.
     """
     poses = _arm(q)
-    hand = poses[-1].compose(_HAND_FRAME)
-    left = Pose(hand.apply((0.0, finger, _FINGER_HEIGHT)), hand.quaternion)
+    hand = poses[-1].compose(HAND_FRAME)
+    left = Pose(hand.apply((0.0, finger, FINGER_HEIGHT)), hand.quaternion)
     right_y = -finger if right_finger is None else -right_finger
-    right = Pose(
-        hand.apply((0.0, right_y, _FINGER_HEIGHT)), multiply(hand.quaternion, _HALF_TURN_Z)
-    )
+    right = Pose(hand.apply((0.0, right_y, FINGER_HEIGHT)), multiply(hand.quaternion, HALF_TURN_Z))
     poses += [hand, left, right]
     return poses
 
@@ -166,7 +169,7 @@ class GraspKinematics:
     def __init__(self, q: Sequence[float] | NDArray[np.float64]) -> None:
         """``q``: joint positions, rad, shape (7,)."""
         self._links = _arm(q)
-        self.grasp = self._links[-1].compose(_HAND_FRAME).compose(_GRASP_FRAME)
+        self.grasp = self._links[-1].compose(HAND_FRAME).compose(_GRASP_FRAME)
 
     def jacobian(self) -> NDArray[np.float64]:
         """The Jacobian of this configuration; see :func:`jacobian`."""

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.obstacle_tower.features import BLOCK
+from slap_ros.domains.obstacle_tower.features import BLOCK, TowerObjectIndex
+from slap_ros.domains.obstacle_tower.support import MARGINS, SUPPORT, margins, support
 from slap_ros.domains.obstacle_tower.tasks import (
     PaperTowerTasks,
     RandomTowerTasks,
@@ -96,6 +97,25 @@ def test_a_batch_is_perceived_like_its_states_whether_they_stand_or_tumble():
             )
         seen += int(truth.sum(axis=0).astype(bool).sum())
     assert seen > 150  # atoms that hold somewhere
+
+
+def test_compiled_code_perceives_the_same():
+    pytest.importorskip("numba")
+    rng, rests = np.random.default_rng(1), 0
+    for seed in range(3):
+        initial = FAIR.task(seed).initial_state
+        index = TowerObjectIndex.of(initial.layout)
+        for row in random_states(initial, rng, 100).data:
+            labels = (row.take(places) > 0.5 for places in (index.is_movable, index.is_target))
+            given = row.take(index.boxes), index.blocks, *labels
+            (on, room), (other_on, other_room) = support(*given), SUPPORT.compiled()(*given)
+            assert (on == other_on).all() and (room == other_room).all()
+            rests += int(on.sum())
+        for many in (row, random_states(initial, rng, 40).data.reshape(2, 20, -1)):
+            by_numpy, by_kernel = margins(index, many), MARGINS.compiled()(index, many)
+            for found, other in zip(by_numpy, by_kernel, strict=True):
+                assert found.shape == other.shape and (found == other).all()
+    assert rests > 100
 
 
 @pytest.mark.parametrize("axis", [0.0, 0.4, 2.0])

@@ -100,7 +100,9 @@ def test_straight_motions_of_the_hand(seed):
         goal = shifted(pose, tuple(rng.uniform(-0.15, 0.15, 3).tolist()))
         if rng.random() < 0.5:
             goal = goal.compose(Pose((0.0, 0.0, 0.0), from_yaw(rng.uniform(-2.0, 2.0))))
-        found, expected = (one.linear_rows(q, goal, 7) for one in (backend(), NumpyBackend()))
+        found, expected = (
+            one.linear_rows(q, grasp_pose(q), goal, 7) for one in (backend(), NumpyBackend())
+        )
         assert (found is None) == (expected is None)
         if found is not None:
             np.testing.assert_allclose(found, expected, atol=1e-7)

@@ -12,8 +12,9 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.worlds.bullet import pybullet
 from slap_ros.worlds.joint_space.arm import Arm
+from slap_ros.worlds.joint_space.drive import Drive
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
-from slap_ros.worlds.joint_space.simulation import Drive, Simulation, Stepping
+from slap_ros.worlds.joint_space.simulation import Simulation, Stepping
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN, HOME, MAX_STEP

@@ -16,7 +16,7 @@ from slap_ros.relational import State, Type
 from slap_ros.worlds.bullet import pybullet
 from slap_ros.worlds.features import body_features
 from slap_ros.worlds.joint_space import simulation_pool
-from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Sweep
+from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Surroundings, Sweep
 from slap_ros.worlds.joint_space.features import ROBOT, robot_features
 from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene, cube
 from slap_ros.worlds.joint_space.world import ACTION_SPACE, PandaWorld
@@ -436,7 +436,7 @@ def test_the_quiet_test_never_overlooks_a_touch():
             turn = rng.normal(size=4)
             turned = Pose(tuple(centre), tuple((turn / np.linalg.norm(turn)).tolist()))
             box = Box("box", (0.04, 0.025, 0.01)).at(turned)
-            if Sweep(*arms).stays_clear([box]):
+            if Sweep(*arms).stays_clear(Surroundings([box])):
                 clear += 1
                 for part in np.linspace(0, 1, 9):
                     arm = Arm.at(q + part * action[:7], FINGER_OPEN)

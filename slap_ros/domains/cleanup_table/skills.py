@@ -18,6 +18,7 @@ from slap_ros.domains.cleanup_table.relations import HAND_CLEAR, OVER, SLOW, TIP
 from slap_ros.domains.cleanup_table.scene import PLANNING_SCENE, carried
 from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.grasps import from_above
+from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.placements import Placement, free_placements
 from slap_ros.domains.tabletop.planning_scene import CARRYING
 from slap_ros.domains.tabletop.skills import (
@@ -35,7 +36,7 @@ from slap_ros.domains.tabletop.state_access import (
     pose_of,
 )
 from slap_ros.domains.tabletop.timing import Timing
-from slap_ros.domains.tabletop.transit import CLEARANCE, PLANS, SEED, memoized
+from slap_ros.domains.tabletop.transit import CLEARANCE, PLANS, SEED
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, rotate

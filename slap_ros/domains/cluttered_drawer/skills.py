@@ -18,12 +18,13 @@ from slap_ros.domains.tabletop.grasps import (
     quarter_turns,
     ways_to_put_down,
 )
+from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.placements import GAP, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, ReachSkill, Transits, TransitSkill
 from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
-from slap_ros.domains.tabletop.transit import Transit, memoized
+from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY

@@ -4,11 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from operator import itemgetter
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +18,6 @@ from slap_ros.worlds.joint_space.features import MATERIAL_FEATURES, ROBOT
 CACHE_SIZE = 1024  # columns of objects, for each layout
 
 Asked = Column | tuple[Column, Column]
-Read = Callable[[Sequence[float]], tuple[Any, ...]]
 
 # Of blocks and surfaces alike, so that predicates can ask both at once.
 THING_FEATURES = (
@@ -48,7 +44,7 @@ class TowerObjectIndex:
     is_movable: Indices
     is_target: Indices
     held: Indices  # (blocks,)
-    boxes: tuple[Read, ...]  # of each, what a ScalarBox is made of
+    boxes: Indices  # (things, 10), arguments of a ScalarBox
     _positions: dict[Asked, Indices] = field(default_factory=dict)
 
     @staticmethod
@@ -61,10 +57,6 @@ class TowerObjectIndex:
         def columns(*features: str) -> Indices:
             return np.array([layout.columns(things, name) for name in features])
 
-        def box(obj: Object) -> Read:
-            names = ("x", "y", "z", *PARTS, *HALF_NAMES)
-            return itemgetter(*(layout.column(obj, name) for name in names))
-
         return TowerObjectIndex(
             len(blocks),
             things,
@@ -75,7 +67,7 @@ class TowerObjectIndex:
             is_movable=columns("is_movable")[0],
             is_target=columns("is_target")[0],
             held=layout.columns(blocks, "held"),
-            boxes=tuple(box(obj) for obj in things),
+            boxes=columns("x", "y", "z", *PARTS, *HALF_NAMES).T,
         )
 
     def positions(self, column: Column) -> Indices:

@@ -22,6 +22,7 @@ from slap_ros.domains.obstacle_tower.predicates import (
 from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.observation import Features, joined
 from slap_ros.relational import Column, GroundAtom, Object, State
+from slap_ros.relational.predicates import cache_latest
 from slap_ros.relational.state import Array
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE, TABLE_TOP
@@ -67,16 +68,15 @@ def _joints_off_target(state: State, hand: Array, column: Column) -> Array:
 
 def _off_target(state: State, column: Column) -> Array:
     """Positions in the plane from the middle of the nearest target, m, shape (n, objects, 2)."""
-    off = _off_targets(state, column)
-    return _of_nearest(off, off)
+    return _of_nearest(_off_targets(state, column))[0]
 
 
 def _over_target(state: State, column: Column) -> Array:
     """The same along the axes of that target."""
     off = _off_targets(state, column)
     turns = state.gather(_targets(state), ("qz", "qw"))[..., None, :, :]
-    dx, dy = np.moveaxis(_of_nearest(off, off), -1, 0)
-    z, w = np.moveaxis(_of_nearest(off, np.broadcast_to(turns, off.shape)), -1, 0)
+    places, turned = _of_nearest(off, np.broadcast_to(turns, off.shape))
+    dx, dy, z, w = places[..., 0], places[..., 1], turned[..., 0], turned[..., 1]
     sin, cos = 2.0 * z * w, w * w - z * z
     return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=-1)
 
@@ -88,13 +88,20 @@ def _off_targets(state: State, column: Column) -> Array:
     return off
 
 
-def _of_nearest(off: Array, values: Array) -> Array:
-    """The values for the nearest target: (n, objects, targets, 2) to (n, objects, 2)."""
+def _of_nearest(off: Array, *others: Array) -> list[Array]:
+    """What holds of the nearest target: each (n, objects, targets, 2) to (n, objects, 2).
+
+    Args:
+        off: Positions from the middles of targets, m.
+        others: What else is asked of that target.
+    """
+    if off.shape[-2] == 1:  # the only one is the nearest
+        return [values[..., 0, :] for values in (off, *others)]
     nearest = np.argmin(np.square(off).sum(axis=-1), axis=-1)[..., None, None]
-    chosen: Array = np.take_along_axis(values, nearest, axis=-2)[..., 0, :]
-    return chosen
+    return [np.take_along_axis(values, nearest, axis=-2)[..., 0, :] for values in (off, *others)]
 
 
+@cache_latest
 def _targets(state: State) -> Column:
     """The targets, or any surface where there is none; they stay so: one state of a batch tells."""
     surfaces = state.layout.column_of(SURFACE)

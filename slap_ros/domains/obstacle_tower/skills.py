@@ -19,12 +19,13 @@ from slap_ros.domains.tabletop.grasps import (
     quarter_turns,
     ways_to_put_down,
 )
+from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.placements import GAP, Placement, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, TransitSkill
 from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
-from slap_ros.domains.tabletop.transit import Transit, memoized
+from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY
@@ -87,15 +88,23 @@ def _onto_middle(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]
 def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """To free places on the table, nearest to the block first."""
     _, block, table = objects
-    pose, board = pose_of(state, block), box_of(state, table)
+    yaw = yaw_of(pose_of(state, block))
+    for place in _places(state, block, table):
+        for how in ways_to_put_down(state):
+            yield _transit_to_placement(state, place, yaw, table, how)
+
+
+@memoized
+def _places(state: State, block: Object, table: Object) -> list[Placement]:
+    """The free places on the table, nearest to the block first."""
+    board = box_of(state, table)
     others = [b for b in state.layout.of_type(BLOCK) if b != block]
     others += [s for s in state.layout.of_type(SURFACE) if s != table]
     taken = [(pose_of(state, thing).position[:2], GAP) for thing in others]
     half_x, half_y, _ = board.half
     margins = half_x - TABLE_MARGIN, half_y - TABLE_MARGIN
-    for place in free_placements(pose.position[:2], board.pose.position[:2], margins, taken):
-        for how in ways_to_put_down(state):
-            yield _transit_to_placement(state, place, yaw_of(pose), table, how)
+    near, middle = pose_of(state, block).position[:2], board.pose.position[:2]
+    return free_placements(near, middle, margins, taken)
 
 
 def skills(timing: Timing) -> dict[str, Skill]:

@@ -18,7 +18,7 @@ things are at a height to touch, and one call of numpy takes longer than to find
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,11 +33,13 @@ from slap_ros.domains.tabletop.footprints import (
     half_widths,
     inverse_yaws,
     steepened,
+    turned,
 )
 from slap_ros.domains.tabletop.scalar_box import ScalarBox
 from slap_ros.relational import State
 from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
+from slap_ros.tiered_function import TieredFunction
 
 TOUCHING = 0.004  # m, height over a thing at which a block still lies on it
 CENTRED = 0.015  # m, distance from the target's middle at which a block still is in it
@@ -53,11 +55,26 @@ class SupportRelations(NamedTuple):
 
 @cache_latest
 def support_relations(state: State) -> SupportRelations:
-    """All margins at once, as predicates share most of the work.
+    """All margins at once, as predicates share most of the work."""
+    objects, data = TowerObjectIndex.of(state.layout), state.data
+    on, room = MARGINS.of(data.size // data.shape[-1])(objects, data)
+    return SupportRelations(objects, on.reshape(*on.shape[:-2], -1), room)
+
+
+# From objects and features, shape (..., features), to margins of blocks on things, m, shape
+# (..., blocks, things), and of room for a block on things, m, shape (..., things).
+Margins = Callable[[TowerObjectIndex, Array], tuple[Array, Array]]
+
+
+def margins(objects: TowerObjectIndex, data: Array) -> tuple[Array, Array]:
+    """What lies on what, as margins, by numpy; see :data:`Margins`.
 
     Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
+
+    Args:
+        objects: Where the features of things are.
+        data: Features of one state or of many, shape (..., features).
     """
-    objects, data = TowerObjectIndex.of(state.layout), state.data
     blocks = slice(objects.blocks)
     q = data.take(objects.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
@@ -73,7 +90,7 @@ def support_relations(state: State) -> SupportRelations:
 
     is_movable = data.take(objects.is_movable, axis=-1) > 0.5
     is_target = data.take(objects.is_target, axis=-1) > 0.5
-    centred = CENTRED - np.abs(offset)
+    centred = CENTRED - np.hypot(offset.real, offset.imag)
     to_target = np.where(is_target[..., None, :], centred, -1.0)[..., objects.blocks :]
     off_target = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
     on_table = np.minimum(covers, off_target)
@@ -82,8 +99,26 @@ def support_relations(state: State) -> SupportRelations:
     on = np.minimum(touches, sideways)
 
     over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
-    room = np.where(is_movable | is_target, strictly(-over), 1.0)
-    return SupportRelations(objects, on.reshape(*on.shape[:-2], -1), room)
+    return on, np.where(is_movable | is_target, strictly(-over), 1.0)
+
+
+def _compiled_margins() -> Margins:
+    from slap_ros.domains.obstacle_tower import kernels
+
+    def compiled(objects: TowerObjectIndex, data: Array) -> tuple[Array, Array]:
+        rows = data.reshape(-1, data.shape[-1])
+        movable, target = (
+            rows.take(labels, axis=-1) > 0.5 for labels in (objects.is_movable, objects.is_target)
+        )
+        boxes = rows.take(objects.boxes, axis=-1)
+        on, room = kernels.margins(boxes, objects.blocks, movable, target)
+        batch = data.shape[:-1]
+        return on.reshape(*batch, *on.shape[1:]), room.reshape(*batch, -1)
+
+    return compiled
+
+
+MARGINS: TieredFunction[Margins] = TieredFunction(margins, _compiled_margins)
 
 
 def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
@@ -98,7 +133,7 @@ def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
     back = inverse_yaws(q, edges)[..., None, :]
     width = half_widths(complex_of(edges[..., :6])[..., None, :], back)
     own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
-    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(offset * back)
+    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(turned(offset, back))
     return np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
 
 
@@ -115,17 +150,35 @@ class SupportTruths(NamedTuple):
 @cache_latest
 def support_truths(state: State) -> SupportTruths:
     """The truths of a single state; only what is at a height to touch is examined closely."""
-    objects, values = TowerObjectIndex.of(state.layout), state.data.tolist()
-    boxes = [ScalarBox(*read(values)) for read in objects.boxes]
+    objects, data = TowerObjectIndex.of(state.layout), state.data
     is_movable, is_target, held = (
-        [values[i] > 0.5 for i in label.tolist()]
-        for label in (objects.is_movable, objects.is_target, objects.held)
+        data.take(labels) > 0.5 for labels in (objects.is_movable, objects.is_target, objects.held)
     )
-    targets = [boxes[i] for i in range(objects.blocks, len(boxes)) if is_target[i]]
-    on = np.zeros((objects.blocks, len(boxes)), dtype=bool)
-    room = np.ones(len(boxes), dtype=bool)
-    for number, block in enumerate(boxes[: objects.blocks]):
-        for i, thing in enumerate(boxes):
+    support = SUPPORT.of(1)
+    on, room = support(data.take(objects.boxes), objects.blocks, is_movable, is_target)
+    return SupportTruths(objects, on.reshape(-1), room, held, np.array([not held.any()]))
+
+
+# From boxes, blocks before surfaces, the number of blocks, and labels of all, to which block is on
+# which thing, shape (blocks, things), and which thing has room for a block, shape (things,).
+Support = Callable[[Array, int, Bools, Bools], tuple[Bools, Bools]]
+
+
+def support(boxes: Array, blocks: int, is_movable: Bools, is_target: Bools) -> tuple[Bools, Bools]:
+    """What lies on what, by plain floats; see :data:`Support`.
+
+    Args:
+        boxes: Arguments of a ``ScalarBox`` for each thing, shape (things, 10).
+        blocks: Number of blocks, which come first.
+        is_movable: Whether each thing is, shape (things,).
+        is_target: Whether each thing is, shape (things,).
+    """
+    things = [ScalarBox(*box) for box in boxes.tolist()]
+    targets = [thing for i, thing in enumerate(things) if i >= blocks and is_target[i]]
+    on = np.zeros((blocks, len(things)), dtype=bool)
+    room = np.ones(len(things), dtype=bool)
+    for number, block in enumerate(things[:blocks]):
+        for i, thing in enumerate(things):
             if abs(block.bottom - thing.top) > TOUCHING:
                 continue
             covers = block.covers(thing)
@@ -135,8 +188,16 @@ def support_truths(state: State) -> SupportTruths:
                 on[number, i] = covers and (is_movable[i] or not _is_on_any(block, targets))
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    empty = np.array([not any(held)])
-    return SupportTruths(objects, on.reshape(-1), room, np.array(held, bool), empty)
+    return on, room
+
+
+def _compiled_support() -> Support:
+    from slap_ros.domains.obstacle_tower import kernels
+
+    return kernels.support
+
+
+SUPPORT: TieredFunction[Support] = TieredFunction(support, _compiled_support)
 
 
 def _is_on_any(block: ScalarBox, targets: Sequence[ScalarBox]) -> bool:

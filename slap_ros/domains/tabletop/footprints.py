@@ -46,6 +46,13 @@ def complex_of(pairs: Array) -> Complex:
     return numbers
 
 
+def turned(vectors: Complex, turns: Complex) -> Complex:
+    """The products, rounded as IEEE 754 says: numpy's own may be fused, where a processor can."""
+    x, y, cos, sin = vectors.real, vectors.imag, turns.real, turns.imag
+    along, aside = x * cos - y * sin, x * sin + y * cos
+    return complex_of(np.stack([along, aside], axis=-1))[..., 0]
+
+
 def along_axes(vectors: Complex) -> Array:
     """How far vectors reach along the axes, shape (..., 2)."""
     return np.abs(vectors[..., None].view(np.float64))
@@ -65,7 +72,7 @@ def inverse_yaws(q: Array, edges: Array) -> Complex:
 
 def half_widths(edges: Complex, back: Complex) -> Array:
     """How far boxes reach from their centres along turned axes, shape (..., 2)."""
-    along = along_axes(edges * back[..., None])
+    along = along_axes(turned(edges, back[..., None]))
     width: Array = along[..., 0, :] + along[..., 1, :] + along[..., 2, :]
     return width
 

@@ -31,6 +31,7 @@ TWIST = (*VELOCITY, "wx", "wy", "wz")
 _MIDDLE = (np.array(JOINT_HIGH) + JOINT_LOW) / 2
 _HALF_RANGE = (np.array(JOINT_HIGH) - JOINT_LOW) / 2
 _GRASP_FRAME = matrix(GRASP_IN_LAST_LINK)
+_MAX_STEP = np.array(MAX_STEP)
 _GRASP_OFFSET = np.array([0.0, 0.0, GRASP_POINT])
 
 
@@ -48,10 +49,15 @@ def hand_frame_and_velocities(state: State) -> Array:
     links = arm_frames(_joints(state))
     frame = _hand_frame(links)
     levers = frame[:, None, :3, 3] - links[:, :, :3, 3]
-    moves = np.cross(links[:, :, :3, 2], levers) * np.array(MAX_STEP)[:, None]
-    last = np.zeros((len(moves), 1, moves.shape[1]))
-    beside = np.concatenate([moves.swapaxes(1, 2), last], axis=1)
-    return np.concatenate([frame, beside], axis=-1)
+    beside = np.zeros((len(frame), 4, 4 + JOINTS))
+    beside[:, :, :4] = frame
+    for row in range(3):  # np.cross takes as long as all else here
+        after, last = (row + 1) % 3, (row + 2) % 3
+        moves = (
+            links[:, :, after, 2] * levers[..., last] - links[:, :, last, 2] * levers[..., after]
+        )
+        beside[:, row, 4:] = moves * _MAX_STEP
+    return beside
 
 
 def _hand_frame(links: Array) -> Array:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import islice
 
 GAP = 0.1  # between the middles of things that stand apart at least, so that fingers fit between
 SPACING = 0.05  # of the grid of places
@@ -34,15 +35,15 @@ def free_placements(
         At most MAX_PLACEMENTS, nearest first.
     """
     (x, y), standing = near, list(taken)
-    places = [
+    columns, rows = (_grid(middle[axis], half[axis], spacing) for axis in range(2))
+    places = [(px, py) for px in columns for py in rows]
+    nearest_first = sorted([(math.hypot(px - x, py - y), (px, py)) for px, py in places])
+    free = (
         (px, py)
-        for px in _grid(middle[0], half[0], spacing)
-        for py in _grid(middle[1], half[1], spacing)
+        for _, (px, py) in nearest_first
         if all(math.hypot(px - tx, py - ty) >= gap for (tx, ty), gap in standing)
-    ]
-    return sorted(places, key=lambda place: (math.hypot(place[0] - x, place[1] - y), place))[
-        :MAX_PLACEMENTS
-    ]
+    )
+    return list(islice(free, MAX_PLACEMENTS))
 
 
 def _grid(middle: float, half: float, spacing: float) -> list[float]:

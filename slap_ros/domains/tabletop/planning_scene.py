@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.state_access import finger_of, grasp_of, held_body
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import CollisionChecker
@@ -46,16 +47,27 @@ class PlanningScene:
         Returns:
             A checker with the held body in the hand and the fingers where they are.
         """
-        held = held_body(state)
-        obstacles = [
-            box for thing, box in self.solid(state) if thing != held and thing not in touched
-        ]
-        return CollisionChecker(
-            obstacles,
-            held=None if held is None else self._in_hand(state, held),
-            finger=finger_of(state),
-            held_margin=held_margin,
-        )
+        return _checker(self, state, touched, held_margin)
 
-    def _in_hand(self, state: State, held: Object) -> OrientedBox:
-        return self.carried(state, held).at(grasp_of(state))
+
+@memoized
+def _checker(
+    scene: PlanningScene, state: State, touched: tuple[Object, ...], held_margin: float
+) -> CollisionChecker:
+    """See :meth:`PlanningScene.checker`: ways to several places on a table have the same."""
+    held = held_body(state)
+    obstacles = [
+        box for thing, box in _solid(scene, state) if thing != held and thing not in touched
+    ]
+    return CollisionChecker(
+        obstacles,
+        held=None if held is None else scene.carried(state, held).at(grasp_of(state)),
+        finger=finger_of(state),
+        held_margin=held_margin,
+    )
+
+
+@memoized
+def _solid(scene: PlanningScene, state: State) -> tuple[tuple[Object, OrientedBox], ...]:
+    """The boxes that things fill in a state: its retreat, crossing and approach all ask."""
+    return tuple(scene.solid(state))

@@ -56,7 +56,8 @@ class ScalarBox:
         if distance2 <= least * least:
             return True
         most = sum(self._half)
-        if distance2 > (most + sum(other._half)) ** 2:
+        reach = most + sum(other._half)
+        if distance2 > reach * reach:
             return False
         (cos, sin), (ahead, aside) = other._frame or other._find_frame()
         ahead -= abs(cos * x + sin * y)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slap_ros.core import Action, Policy
+from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.timing import ROUNDING, Timing
 from slap_ros.domains.tabletop.transit import Transit
@@ -99,11 +100,7 @@ class TransitSkill:
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
         """The bound of the shortest transit that may be followed, and what comes after it."""
-        least, before = math.inf, None
-        for transit in self._ways(state, objects):
-            if before is not None and before.is_open:
-                break
-            least, before = min(least, transit.least_steps(self.timing)), transit
+        least = _least_steps(self, state, objects)
         # Without a transit there is no roll-out, so that any bound is admissible.
         return self.step_limit if math.isinf(least) else int(least) + self._after
 
@@ -113,7 +110,7 @@ class TransitSkill:
         Raises:
             SkillNotApplicableError: None of the transits can be planned.
         """
-        for transit in self._ways(state, objects):
+        for transit in self.ways(state, objects):
             try:
                 return TrajectoryFollower(self._trajectory(transit), self.timing.max_step)
             except SkillNotApplicableError:
@@ -124,7 +121,7 @@ class TransitSkill:
     def _after(self) -> int:
         return 2 if self.lift > 0.0 else 1
 
-    def _ways(self, state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
+    def ways(self, state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
         """The transits, in the order in which they are tried."""
         tried = []
         for transit in self.transits(state, objects):
@@ -146,6 +143,17 @@ class TransitSkill:
             lift = self.timing.positions([up], transit.touching)
             trajectory += [(position, 0.0) for position in lift]
         return trajectory
+
+
+@memoized
+def _least_steps(skill: TransitSkill, state: State, objects: tuple[Object, ...]) -> float:
+    """The bound of the shortest transit: every search in a graph asks for it again."""
+    least, before = math.inf, None
+    for transit in skill.ways(state, objects):
+        if before is not None and before.is_open:
+            break
+        least, before = min(least, transit.least_steps(skill.timing)), transit
+    return least
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ What it takes to bound a transit's length serves to plan it, too, and is compute
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
-from typing import ParamSpec, TypeVar, cast
+from functools import cached_property
 
 import numpy as np
 
+from slap_ros.domains.tabletop.memory import forgotten_with_all, memoized
 from slap_ros.domains.tabletop.planning_scene import CARRYING, RELAXED, PlanningScene
 from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.timing import Timing
@@ -41,24 +41,7 @@ HIGHER = 2.0 * CLEARANCE  # m, where things as high as what is held stand close 
 SEED = 0  # of motion plans: a plan is a function of the state alone
 ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
-CACHE_SIZE = 1024  # answers of each function below, and of a domain's that make transits
-_CLEAR: list[Callable[[], None]] = [PLANS.clear]
-
-Given = ParamSpec("Given")
-T = TypeVar("T")
-
-
-def memoized(compute: Callable[Given, T]) -> Callable[Given, T]:
-    """Compute once what is asked for again, until :func:`clear_caches`: transits, above all."""
-    cached = lru_cache(maxsize=CACHE_SIZE)(compute)
-    _CLEAR.append(cached.cache_clear)
-    return cast(Callable[Given, T], cached)
-
-
-def clear_caches() -> None:
-    """Remove every cached motion, for fair measurements; nothing else changes."""
-    for clear in _CLEAR:
-        clear()
+forgotten_with_all(PLANS.clear)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.compilation import compiled, inner
+from slap_ros.geometry.pose import Vector
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import Array, Joints
 from slap_ros.motion.kernels.kinematics import place_links
 from slap_ros.motion.kernels.separation import separated
+from slap_ros.motion.kernels.vectors import Matrix, applied, dot, matrix, transposed, vector
 from slap_ros.worlds.panda import JOINTS
 
 
@@ -20,22 +22,20 @@ def is_free(q: Joints, scene: CollisionScene) -> bool:
     """Whether a configuration is free: rad, shape (7,)."""
     frames = np.empty((JOINTS, 3, 4))
     place_links(q, frames)
-    seen = np.empty(3)
-    for shape in range(len(scene.links)):
+    for shape in range(len(scene.links) - 1, -1, -1):  # the hand, which mostly collides first
         link, inside = frames[scene.links[shape]], scene.frames[shape]
-        x, y, z = _moved(link, inside, 0), _moved(link, inside, 1), _moved(link, inside, 2)
+        centre = _moved(link, inside, 0), _moved(link, inside, 1), _moved(link, inside, 2)
         for obstacle in range(len(scene.sizes)):
-            turn = scene.turns[obstacle]
-            for i in range(3):
-                seen[i] = (
-                    x * turn[0, i] + y * turn[1, i] + z * turn[2, i] - scene.origins[obstacle, i]
-                )
-            near = _outside2(seen, scene.sizes[obstacle]) < scene.reaches2[shape, obstacle]
+            if _distance2(centre, scene.middles[obstacle]) >= scene.far2[shape, obstacle]:
+                continue
+            turn, size = matrix(scene.turns[obstacle]), vector(scene.sizes[obstacle])
+            seen = _seen(centre, turn, scene.origins[obstacle])
+            near = _outside2(seen, size) < scene.reaches2[shape, obstacle]
             if near and not separated(
                 _turn_between(link, inside, turn),
                 seen,
-                scene.halves[shape],
-                scene.sizes[obstacle],
+                vector(scene.halves[shape]),
+                size,
                 scene.clearances[shape],
             ):
                 return False
@@ -51,7 +51,26 @@ def _moved(link: Array, inside: Array, row: int) -> float:
 
 
 @inner
-def _outside2(point: Array, size: Array) -> float:
+def _distance2(a: Vector, b: Array) -> float:
+    """The squared distance of two points."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    distance2: float = x * x + y * y + z * z
+    return distance2
+
+
+@inner
+def _seen(point: Vector, turn: Matrix, origin: Array) -> Vector:
+    """A point seen from an obstacle."""
+    first, second, third = transposed(turn)
+    return (
+        dot(point, first) - origin[0],
+        dot(point, second) - origin[1],
+        dot(point, third) - origin[2],
+    )
+
+
+@inner
+def _outside2(point: Vector, size: Vector) -> float:
     """The squared distance of a point from a box."""
     x = max(abs(point[0]) - size[0], 0.0)
     y = max(abs(point[1]) - size[1], 0.0)
@@ -61,22 +80,16 @@ def _outside2(point: Array, size: Array) -> float:
 
 
 @inner
-def _turn_between(link: Array, inside: Array, obstacle: Array) -> Array:
-    """The orientation of an obstacle seen from a frame in a link: shape (3, 3)."""
-    shape, turn = np.empty((3, 3)), np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            shape[i, j] = (
-                link[i, 0] * inside[0, j] + link[i, 1] * inside[1, j] + link[i, 2] * inside[2, j]
-            )
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = (
-                shape[0, i] * obstacle[0, j]
-                + shape[1, i] * obstacle[1, j]
-                + shape[2, i] * obstacle[2, j]
-            )
-    return turn
+def _turn_between(link: Array, inside: Array, obstacle: Matrix) -> Matrix:
+    """The orientation of an obstacle seen from a frame in a link."""
+    first, second, third = transposed(matrix(inside))
+    shape = (
+        applied(matrix(link), first),
+        applied(matrix(link), second),
+        applied(matrix(link), third),
+    )  # columns of the frame's orientation
+    first, second, third = transposed(obstacle)
+    return transposed((applied(shape, first), applied(shape, second), applied(shape, third)))
 
 
 @compiled

@@ -32,9 +32,8 @@ class CompiledBackend:
         """See :meth:`slap_ros.motion.backend.Backend.free_space`."""
         return CompiledFreeSpace(scene)
 
-    def linear_rows(self, q: Joints, target: Pose, count: int) -> Path | None:
+    def linear_rows(self, q: Joints, start: Pose, target: Pose, count: int) -> Path | None:
         """See :meth:`slap_ros.motion.backend.Backend.linear_rows`."""
-        start = grasp_pose(q)
         shift = np.subtract(target.position, start.position)
         turn = np.array(rotation_vector(start, target))
         path = rows_to(np.array(q), matrix(start), shift, turn, count)
@@ -50,7 +49,7 @@ class CompiledBackend:
         space = self.free_space(scene)
         return [
             lambda: self.arm_frames(start[None]),
-            lambda: self.linear_rows(start, grasp_pose(goal), 1),
+            lambda: self.linear_rows(start, grasp_pose(start), grasp_pose(goal), 1),
             lambda: space.nearest_configurations(np.eye(4)[None], start),
             lambda: space.free(start[None]),
             lambda: space.line_is_free(start, goal, RESOLUTION),

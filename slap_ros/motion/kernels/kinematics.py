@@ -7,10 +7,15 @@ from __future__ import annotations
 import numpy as np
 
 from slap_ros.compilation import compiled, inner
+from slap_ros.geometry.pose import Vector
 from slap_ros.motion.joints import Array, Joints
 from slap_ros.motion.kernels.trigonometry import sin_cos
+from slap_ros.motion.kernels.vectors import Matrix, applied, matrix, total, transposed, vector
 from slap_ros.motion.kinematics import AT_ZERO
 from slap_ros.worlds.panda import JOINTS
+
+Frame = tuple[Matrix, Vector]  # orientation and origin
+IDENTITY: Frame = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0)
 
 
 @inner
@@ -22,27 +27,40 @@ def place_links(q: Joints, frames: Array) -> None:
         frames: Homogeneous transforms without their last rows, lengths in m, shape (7, 3, 4) or
             more rows; overwritten.
     """
+    outer = IDENTITY
     for joint in range(JOINTS):
         sine, cosine = sin_cos(q[joint])
-        zero = AT_ZERO[joint]
-        for row in range(3):
-            x, y = zero[row, 0], zero[row, 1]
-            frames[joint, row, 0] = cosine * x + sine * y
-            frames[joint, row, 1] = cosine * y + sine * -x
-            frames[joint, row, 2] = zero[row, 2]
-            frames[joint, row, 3] = zero[row, 3]
+        frame = _turned(matrix(AT_ZERO[joint]), vector(AT_ZERO[joint, :, 3]), sine, cosine)
         if joint > 0:
-            _compose(frames[joint - 1], frames[joint])
+            frame = _composed(outer, frame)
+        outer = frame
+        for row in range(3):
+            (frames[joint, row, 0], frames[joint, row, 1], frames[joint, row, 2]) = frame[0][row]
+            frames[joint, row, 3] = frame[1][row]
 
 
 @inner
-def _compose(outer: Array, frame: Array) -> None:
-    """Turn a frame that is given in another into one that is given where the other is."""
-    for column in range(4):
-        x, y, z = frame[0, column], frame[1, column], frame[2, column]
-        for row in range(3):
-            seen = outer[row, 0] * x + outer[row, 1] * y + outer[row, 2] * z
-            frame[row, column] = seen + outer[row, 3] if column == 3 else seen
+def _turned(zero: Matrix, origin: Vector, sine: float, cosine: float) -> Frame:
+    """The frame of a joint that is turned about its own z axis."""
+    return (
+        _turned_row(zero[0], sine, cosine),
+        _turned_row(zero[1], sine, cosine),
+        _turned_row(zero[2], sine, cosine),
+    ), origin
+
+
+@inner
+def _turned_row(row: Vector, sine: float, cosine: float) -> Vector:
+    x, y, z = row
+    return cosine * x + sine * y, cosine * y + sine * -x, z
+
+
+@inner
+def _composed(outer: Frame, frame: Frame) -> Frame:
+    """A frame that is given in another, as it is where the other is."""
+    (first, second, third), (turn, origin) = transposed(frame[0]), outer
+    columns = applied(turn, first), applied(turn, second), applied(turn, third)
+    return transposed(columns), total(applied(turn, frame[1]), origin)
 
 
 @compiled

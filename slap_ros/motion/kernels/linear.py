@@ -16,8 +16,8 @@ from slap_ros.motion.joints import STEP, Array, Joints, Path
 from slap_ros.motion.kernels.inverse_kinematics import is_within_limits
 from slap_ros.motion.kernels.kinematics import place_links
 from slap_ros.motion.kernels.lines import control_steps
-from slap_ros.motion.kernels.separation import dot
 from slap_ros.motion.kernels.trigonometry import arctan2, sin_cos
+from slap_ros.motion.kernels.vectors import dot
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, matrix
 from slap_ros.motion.linear import CLOSE, DAMPING, HALVINGS, ITERATIONS, LARGEST_JUMP
 from slap_ros.worlds.panda import JOINTS

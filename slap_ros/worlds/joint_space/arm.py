@@ -8,23 +8,89 @@ A held body is one more link on the hand.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, Self, TypeVar
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY, Pose, Quaternion, Vector
+from slap_ros.tiered_function import TieredFunction
+from slap_ros.worlds.joint_space.drive import Drive
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
 from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.panda import HAND, link_poses
+
+T = TypeVar("T")
 
 CLEARANCE = 0.003  # m, between the boxes around a link and a body, at which they do not touch
 LINK_DEPTH = 0.01  # m, how far a link may reach into a fixed body
 HELD_DEPTH = 0.02  # m, how far a held body may
 SAMPLING = 0.02  # m, of a link's way between two samples of what it hits, at the finest
-FINE = 0.01  # m, the same for what it comes near
+SPACINGS = (0.01, 0.001)  # m, the same for what it comes near, the finer where the coarser does
 
 _RADII = tuple(shape.radius for shape in LINK_SHAPES)
+
+
+class Surroundings(tuple[T, ...]):
+    """Things that stand still around the arm; equal to themselves alone, and so found at once."""
+
+    __hash__ = object.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __ne__(self, other: object) -> bool:
+        return self is not other
+
+
+class Way(Protocol):
+    """The arm's way from one configuration to another; see :class:`Sweep`."""
+
+    @property
+    def start(self) -> Posture:
+        """The arm at its beginning."""
+        ...
+
+    @property
+    def end(self) -> Posture:
+        """The arm at its end."""
+        ...
+
+    def stays_clear(self, boxes: Surroundings[OrientedBox]) -> bool:
+        """See :meth:`Sweep.stays_clear`."""
+        ...
+
+    def hits(self, obstacles: Surroundings[Obstacle]) -> bool:
+        """See :meth:`Sweep.hits`."""
+        ...
+
+    def deepest_penetration(
+        self, obstacles: Surroundings[Obstacle], held_depth: float = HELD_DEPTH
+    ) -> Penetration | None:
+        """See :meth:`Sweep.deepest_penetration`."""
+        ...
+
+    def drives(self) -> list[Drive]:
+        """See :meth:`Sweep.drives`."""
+        ...
+
+
+class Posture(Protocol):
+    """The arm in one configuration; see :class:`Arm`."""
+
+    @property
+    def links(self) -> tuple[Pose, ...]:
+        """Where the links are, then the held body."""
+        ...
+
+    @property
+    def held_pose(self) -> Pose:
+        """Pose of the held body; only where there is one."""
+        ...
+
+    def to(self, end: Self) -> Way:
+        """See :meth:`Arm.to`."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -74,6 +140,10 @@ class Arm:
         """Pose of the held body; only where there is one."""
         return self.links[len(LINK_SHAPES)]
 
+    def to(self, end: Arm) -> Sweep:
+        """The way from here to another configuration."""
+        return Sweep(self, end)
+
     def box(self, link: int) -> OrientedBox:
         """The box around a link, which is asked for again and again."""
         box = self._boxes.get(link)
@@ -93,7 +163,7 @@ class Arm:
             Whether it is closer than that.
         """
         reach = distance + self.radii[link]
-        return math.dist(point, self.centres[link]) < reach and self.box(link).near(point, distance)
+        return _distance(point, self.centres[link]) < reach and self.box(link).near(point, distance)
 
     def box_at(self, link: int, pose: Pose) -> OrientedBox:
         """The box around a link, were the link at that pose."""
@@ -125,7 +195,10 @@ class Penetration(NamedTuple):
 
 
 class Sweep:
-    """The arm's way from one configuration to another in a control step."""
+    """The arm's way from one configuration to another in a control step.
+
+    ``kernels.py`` has the same as compiled code, to the bit.
+    """
 
     __slots__ = ("end", "start", "travel")
 
@@ -133,7 +206,7 @@ class Sweep:
         self.start, self.end = start, end
         # How far any point of each link goes at most, in m.
         self.travel = [
-            math.dist(a, b) + _angle(p.quaternion, q.quaternion) * radius
+            _distance(a, b) + _angle(p.quaternion, q.quaternion) * radius
             for a, b, p, q, radius in zip(
                 start.centres, end.centres, start.links, end.links, start.radii, strict=True
             )
@@ -171,7 +244,11 @@ class Sweep:
 
     def _touches_on_the_way(self, link: int, box: OrientedBox) -> bool:
         """Whether the box around a link comes near another anywhere on its way."""
-        samples = math.ceil(self.travel[link] / FINE) or 1
+        return all(self._touches(link, box, spacing) for spacing in SPACINGS)
+
+    def _touches(self, link: int, box: OrientedBox, spacing: float) -> bool:
+        """Whether it may, as far as samples of its way tell that are so far apart (m) at most."""
+        samples = math.ceil(self.travel[link] / spacing) or 1
         around = box.grown(CLEARANCE + 0.5 * self.travel[link] / samples)
         from_end = range(samples, -1, -1)  # where it mostly is when it touches
         return any(around.overlaps(self._at(link, k / samples)) for k in from_end)
@@ -213,12 +290,13 @@ class Sweep:
                     point = min(self.end.box(link).corners(), key=lambda corner: corner[2])
                     depth = top - core - point[2]
                     if depth > 0.0 and (found is None or depth > found.depth):
-                        found = Penetration(self._carrier(link), point, depth)
+                        found = Penetration(carrier(link), point, depth)
         return found
 
-    def _carrier(self, link: int) -> int:
-        """Which of the robot's links a link is, or is held by."""
-        return LINK_SHAPES[link].link if link < len(LINK_SHAPES) else HAND
+    def drives(self) -> list[Drive]:
+        """How each link moves on this way, the held body last."""
+        ways = zip(self.start.links, self.end.links, strict=True)
+        return [Drive.between(start, end) for start, end in ways]
 
     def _enters(self, link: int, box: OrientedBox, depth: float) -> bool:
         core = box.shrunk(depth)
@@ -230,12 +308,17 @@ class Sweep:
         if part == 1.0:
             return self.end.box(link)
         (p, q), (u, v) = self.start.links[link], self.end.links[link]
-        sign = math.copysign(1.0, sum(a * b for a, b in zip(q, v, strict=True)))
+        sign = math.copysign(1.0, q[0] * v[0] + q[1] * v[1] + q[2] * v[2] + q[3] * v[3])
         x, y, z, w = (a + part * (sign * b - a) for a, b in zip(q, v, strict=True))
-        length = math.hypot(x, y, z, w)
+        length = math.sqrt(x * x + y * y + z * z + w * w)
         px, py, pz = (a + part * (b - a) for a, b in zip(p, u, strict=True))
         pose = Pose((px, py, pz), (x / length, y / length, z / length, w / length))
         return self.start.box_at(link, pose)
+
+
+def carrier(link: int) -> int:
+    """Which of the robot's links a link is, or is held by: an index in ``panda.LINKS``."""
+    return LINK_SHAPES[link].link if link < len(LINK_SHAPES) else HAND
 
 
 def _depth(link: int) -> float:
@@ -243,6 +326,25 @@ def _depth(link: int) -> float:
     return LINK_DEPTH if link < len(LINK_SHAPES) else HELD_DEPTH
 
 
+def _distance(a: Vector, b: Vector) -> float:
+    """The distance of two points, m: compiled code cannot have the last bits of ``math.dist``."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
 def _angle(p: Quaternion, q: Quaternion) -> float:
     """The angle between two orientations in rad, to 1e-8."""
     return 2.0 * math.acos(min(1.0, abs(p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3])))
+
+
+# From joint positions, finger, held body and grasp, as Arm.at has them.
+PostureAt = Callable[[Sequence[float], float, Body | None, Pose], Posture]
+
+
+def _compiled_arm() -> PostureAt:
+    from slap_ros.worlds.joint_space.compiled_arm import CompiledArm
+
+    return CompiledArm
+
+
+POSTURE_AT: TieredFunction[PostureAt] = TieredFunction(Arm.at, _compiled_arm)

@@ -6,7 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from slap_ros.worlds.joint_space.arm import HELD_DEPTH, Arm, Obstacle, Penetration, Sweep
+from slap_ros.worlds.joint_space.arm import (
+    HELD_DEPTH,
+    Obstacle,
+    Penetration,
+    Posture,
+    Surroundings,
+)
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, vertical_jacobian
 
 Configuration = tuple[float, ...]  # joint positions, rad
@@ -18,8 +24,8 @@ RAISE_CLEARANCE = 1e-4  # m, over where it just does not
 def off_fixed_bodies(
     start: Configuration,
     goal: Configuration,
-    arm_at: Callable[[Configuration], Arm],
-    obstacles: Sequence[Obstacle],
+    arm_at: Callable[[Configuration], Posture],
+    obstacles: Surroundings[Obstacle],
     highest: float,
     held_depth: float = HELD_DEPTH,
 ) -> Configuration:
@@ -39,7 +45,7 @@ def off_fixed_bodies(
     joints = goal
     for _ in range(MAX_RAISES):
         arm = arm_at(joints)
-        penetration = Sweep(arm, arm).deepest_penetration(obstacles, held_depth)
+        penetration = arm.to(arm).deepest_penetration(obstacles, held_depth)
         if penetration is None:
             return joints
         if penetration.depth > highest:
@@ -79,7 +85,5 @@ def within_limits(joints: Configuration, displacement: Sequence[float]) -> Confi
         joints: Joint positions, rad.
         displacement: How far each is to move, rad.
     """
-    moved = (q + d for q, d in zip(joints, displacement, strict=True))
-    return tuple(
-        min(max(q, low), high) for low, q, high in zip(JOINT_LOW, moved, JOINT_HIGH, strict=True)
-    )
+    moved = zip(joints, displacement, JOINT_LOW, JOINT_HIGH, strict=True)
+    return tuple([min(max(q + d, low), high) for q, d, low, high in moved])

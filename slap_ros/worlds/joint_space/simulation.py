@@ -14,18 +14,17 @@ without velocity, an arm only penetrates.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
 
-from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector, conjugate, multiply
+from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.worlds.bodies import Material
 from slap_ros.worlds.bullet import PANDA, pybullet
+from slap_ros.worlds.joint_space.drive import Drive
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
 from slap_ros.worlds.joint_space.scene import REFERENCE_FRICTION, Body, Scene, Shape
 from slap_ros.worlds.layout_index import BodyState
@@ -48,27 +47,6 @@ class Stepping:
 
     substeps: int = 32  # a power of two: 1/256 s each, and exact
     iterations: int = 20  # of the contact solver
-
-
-class Drive(NamedTuple):
-    """A driven body's way through a control period."""
-
-    start: Pose
-    velocity: Vector  # m/s
-    angular_velocity: Vector  # rad/s
-
-    @classmethod
-    def between(cls, start: Pose, end: Pose) -> Drive:
-        """The drive from one pose to another at constant velocity, the shorter way round."""
-        (ax, ay, az), (bx, by, bz) = start.position, end.position
-        t = CONTROL_PERIOD_S
-        x, y, z, w = multiply(end.quaternion, conjugate(start.quaternion))
-        sine = math.sqrt(x * x + y * y + z * z)
-        rate = 0.0 if sine < 1e-12 else 2.0 * math.atan2(sine, abs(w)) / sine / t
-        rate = math.copysign(rate, w)
-        return cls(
-            start, ((bx - ax) / t, (by - ay) / t, (bz - az) / t), (x * rate, y * rate, z * rate)
-        )
 
 
 def _parking(index: int) -> Vector:
@@ -118,7 +96,9 @@ class Simulation:
         }
         self._held_proxy_frictions = dict.fromkeys(shapes, REFERENCE_FRICTION)
         self._driven = [*self._links, *self._held_proxies.values()]
-        self._parking = {body: _parking(i) for i, body in enumerate([*self._free, *self._driven])}
+        parking = [_parking(i) for i in range(len(self._free) + len(self._driven))]
+        self._free_parking = list(zip(self._free, parking, strict=False))
+        self._driven_parking = list(zip(self._driven, parking[len(self._free) :], strict=True))
 
     def close(self) -> None:
         """Give the client back."""
@@ -195,14 +175,13 @@ class Simulation:
         setting a pose leaves as it was, becomes a function of the orientation.
         """
         client = self.client
-        for body, motion in zip(self._free, bodies, strict=True):
-            pybullet.resetBasePositionAndOrientation(
-                body, self._parking[body], motion.pose.quaternion, client
-            )
-            pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
-        for body in self._driven:
-            pybullet.resetBasePositionAndOrientation(body, self._parking[body], NO_ROTATION, client)
-            pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
+        place, move = pybullet.resetBasePositionAndOrientation, pybullet.resetBaseVelocity
+        for (body, parking), motion in zip(self._free_parking, bodies, strict=True):
+            place(body, parking, motion.pose.quaternion, client)
+            move(body, ORIGIN, ORIGIN, client)
+        for body, parking in self._driven_parking:
+            place(body, parking, NO_ROTATION, client)
+            move(body, ORIGIN, ORIGIN, client)
         self._advance(0)
 
     def _advance(self, substeps: int) -> None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 from slap_ros.geometry.pose import IDENTITY, Pose
@@ -35,8 +35,15 @@ class Snapshot:
 
     def moved(self, index: int, motion: BodyState) -> Snapshot:
         """The same snapshot with one body elsewhere."""
-        bodies = (*self.bodies[:index], motion, *self.bodies[index + 1 :])
-        return replace(self, bodies=bodies)
+        return self.with_bodies((*self.bodies[:index], motion, *self.bodies[index + 1 :]))
+
+    def with_joints(self, joints: tuple[float, ...]) -> Snapshot:
+        """The same snapshot with the arm elsewhere."""
+        return Snapshot(joints, self.finger, self.grasp, self.held, self.bodies)
+
+    def with_bodies(self, bodies: tuple[BodyState, ...]) -> Snapshot:
+        """The same snapshot with the bodies elsewhere."""
+        return Snapshot(self.joints, self.finger, self.grasp, self.held, bodies)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,27 +79,22 @@ class SceneIndex(LayoutIndex):
         grasp = IDENTITY if held is None else pose_of((x, y, z, qx, qy, qz, qw))
         return Snapshot(tuple(joints), finger, grasp, held, bodies)
 
-    def write(self, state: State, snapshot: Snapshot) -> State:
-        """The state with its physics replaced."""
-        data = state.data.copy()
-        grasp = snapshot.grasp
-        data[self.robot] = (
-            *snapshot.joints,
-            snapshot.finger,
-            *grasp.position,
-            *grasp.quaternion,
-        )
-        if snapshot.bodies:
-            data[self.bodies] = [
-                (
-                    *pose.position,
-                    *pose.quaternion,
-                    *velocity,
-                    *angular_velocity,
-                    float(i == snapshot.held),
-                )
-                for i, (pose, velocity, angular_velocity) in enumerate(snapshot.bodies)
-            ]
+    def write(self, state: State, before: Snapshot, after: Snapshot) -> State:
+        """The state with its physics replaced.
+
+        Args:
+            state: State to change.
+            before: Physics of that state. What is the same object in both is not written.
+            after: Physics to write.
+        """
+        data, grasp = state.data.copy(), after.grasp
+        data[self.robot] = (*after.joints, after.finger, *grasp.position, *grasp.quaternion)
+        bodies = enumerate(zip(before.bodies, after.bodies, strict=True))
+        changed = [i for i, (old, new) in bodies if new is not old]
+        if after.held != before.held:
+            changed = list(range(len(after.bodies)))
+        if changed:
+            data[self.bodies[changed]] = [_row(after, i) for i in changed]
         return State(state.layout, data)
 
     def materials(self, scene: Scene, state: State) -> tuple[Material, ...]:
@@ -101,3 +103,9 @@ class SceneIndex(LayoutIndex):
             body.material if columns is None else Material(*state.data[columns].tolist())
             for body, columns in zip(scene.free, self.material_columns, strict=True)
         )
+
+
+def _row(snapshot: Snapshot, index: int) -> tuple[float, ...]:
+    """The features of a free body."""
+    (position, quaternion), velocity, turning = snapshot.bodies[index]
+    return (*position, *quaternion, *velocity, *turning, float(index == snapshot.held))

@@ -11,7 +11,7 @@ from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.worlds.bodies import Material
-from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Sweep
+from slap_ros.worlds.joint_space.arm import Obstacle, Posture, Surroundings
 from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.snapshot import Snapshot
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW
@@ -28,8 +28,8 @@ def require_valid(
     scene: Scene,
     snapshot: Snapshot,
     materials: Sequence[Material],
-    arm: Arm,
-    obstacles: Sequence[Obstacle],
+    arm: Posture,
+    obstacles: Surroundings[Obstacle],
 ) -> None:
     """Refuse a state that no scene can be in.
 
@@ -54,7 +54,7 @@ def require_valid(
         raise InvalidStateError(f"finger = {snapshot.finger} m is not within [0, {FINGER_OPEN}]")
     if snapshot.held is not None:
         _require_in_hand(scene, snapshot, arm)
-    if Sweep(arm, arm).hits(obstacles):
+    if arm.to(arm).hits(obstacles):
         raise InvalidStateError("the arm, or what it holds, is inside a fixed body")
     _require_apart(scene, snapshot, obstacles)
 
@@ -77,7 +77,7 @@ def _require_rotations(scene: Scene, snapshot: Snapshot) -> None:
             raise InvalidStateError(f"the quaternion of {name} has length {length}, not 1")
 
 
-def _require_in_hand(scene: Scene, snapshot: Snapshot, arm: Arm) -> None:
+def _require_in_hand(scene: Scene, snapshot: Snapshot, arm: Posture) -> None:
     assert snapshot.held is not None
     is_at: Pose = snapshot.bodies[snapshot.held].pose
     wanted = arm.held_pose

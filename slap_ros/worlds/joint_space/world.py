@@ -9,12 +9,21 @@ action, bit for bit (``docs/physics.md`` says how, and what it costs).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from slap_ros.core import Action, ActionSpace, GripperAxis
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Feature, State
 from slap_ros.worlds.features import JOINT_FEATURES
-from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Penetration, Sweep
+from slap_ros.worlds.joint_space.arm import (
+    POSTURE_AT,
+    Obstacle,
+    Penetration,
+    Posture,
+    Surroundings,
+    Way,
+)
 from slap_ros.worlds.joint_space.gripper import grip
 from slap_ros.worlds.joint_space.raising import (
     MAX_RAISES,
@@ -23,7 +32,7 @@ from slap_ros.worlds.joint_space.raising import (
     within_limits,
 )
 from slap_ros.worlds.joint_space.scene import Scene
-from slap_ros.worlds.joint_space.simulation import Drive, Stepping
+from slap_ros.worlds.joint_space.simulation import Stepping
 from slap_ros.worlds.joint_space.simulation_pool import acquire, release
 from slap_ros.worlds.joint_space.snapshot import SceneIndex, Snapshot
 from slap_ros.worlds.joint_space.validation import require_valid
@@ -46,6 +55,15 @@ REST_TURN = 1e-3  # 1, of each component of the quaternion
 PRESS_LIMIT = 0.006  # m, how far the arm may press bodies into one another; deeper, it yields
 JAM_LIMIT = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
 CACHE_SIZE = 256  # arrangements of bodies of which it is known whether they are stable
+
+
+@dataclass(eq=False, slots=True)
+class _Arrangement:
+    """Free bodies without velocity that are not held, among fixed ones."""
+
+    poses: tuple[tuple[int, Pose], ...] = ()  # each with its index
+    boxes: Surroundings[OrientedBox] = field(default_factory=Surroundings)
+    stable: bool | None = None  # None: nobody has asked
 
 
 class PandaWorld(SimulatedWorld[Scene]):
@@ -75,6 +93,8 @@ class PandaWorld(SimulatedWorld[Scene]):
         self._index = SceneIndex.of(scene, state.layout)
         self._stability: dict[object, bool] = {}
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
+        self._fixed_poses: tuple[Pose, ...] = ()
+        self._obstacles: Surroundings[Obstacle] = Surroundings()
         self._adopt(state)
         self._simulation = acquire(scene, stepping)
         self._give_back(self._simulation, release)
@@ -99,13 +119,21 @@ class PandaWorld(SimulatedWorld[Scene]):
         state.require_finite()
         snapshot = self._index.read(state)
         poses = self._index.fixed_poses(self._scene.fixed, state)
-        obstacles = [Obstacle.of(self._scene.fixed[i].at(poses[i])) for i in self._solid]
+        obstacles = self._obstacles_at(poses)
         materials = self._index.materials(self._scene, state)
+        self._posture_at = POSTURE_AT.of(1)
         arm = self._arm(snapshot)
         require_valid(self._scene, snapshot, materials, arm, obstacles)
         self._state, self._snapshot, self._posture = state, snapshot, arm
         self._fixed_poses, self._materials = poses, materials
-        self._obstacles: list[Obstacle] = obstacles
+        self._obstacles = obstacles
+        self._arrangement = _Arrangement()
+
+    def _obstacles_at(self, poses: tuple[Pose, ...]) -> Surroundings[Obstacle]:
+        """The solid fixed bodies, which mostly stand where they stood before."""
+        if poses == self._fixed_poses:
+            return self._obstacles
+        return Surroundings(Obstacle.of(self._scene.fixed[i].at(poses[i])) for i in self._solid)
 
     def step(self, action: Action) -> State:
         """Act for one control period.
@@ -126,9 +154,10 @@ class PandaWorld(SimulatedWorld[Scene]):
         start = self._posture
         if gripped is not self._snapshot:  # the fingers are still where they were
             start = self._arm(replace(gripped, finger=self._snapshot.finger))
-        goal = replace(gripped, joints=within_limits(gripped.joints, displacement))
+        goal = gripped.with_joints(within_limits(gripped.joints, displacement))
+        before = self._snapshot
         self._snapshot, self._posture = self._after(gripped, goal, start)
-        self._state = self._index.write(self._state, self._snapshot)
+        self._state = self._index.write(self._state, before, self._snapshot)
         return self._state
 
     def joints_off_fixed_bodies(
@@ -150,7 +179,7 @@ class PandaWorld(SimulatedWorld[Scene]):
         return off_fixed_bodies(
             start,
             self._snapshot.joints,
-            lambda joints: self._arm(replace(self._snapshot, joints=joints)),
+            lambda joints: self._arm(self._snapshot.with_joints(joints)),
             self._obstacles,
             highest,
             depth,
@@ -161,52 +190,50 @@ class PandaWorld(SimulatedWorld[Scene]):
         gripped = grip(self._scene, self._snapshot, command)
         if gripped is not self._snapshot:
             arm = self._arm(gripped)
-            if Sweep(arm, arm).hits(self._obstacles):
+            if arm.to(arm).hits(self._obstacles):
                 return self._snapshot
         return gripped
 
-    def _after(self, now: Snapshot, goal: Snapshot, start: Arm) -> tuple[Snapshot, Arm]:
+    def _after(self, now: Snapshot, goal: Snapshot, start: Posture) -> tuple[Snapshot, Posture]:
         """Where everything is once the arm went to its goal, or stayed because it must not."""
-        sweep = Sweep(start, self._arm(goal))
+        sweep = start.to(self._arm(goal))
         if sweep.hits(self._obstacles):
             goal = self._sliding(now, goal, start)
-            sweep = Sweep(start, self._arm(goal))
+            sweep = start.to(self._arm(goal))
         bodies, depth = self._bodies_after(now, sweep)
         for softer in (_hand_raised, _half_way, _stay):
             if depth <= PRESS_LIMIT or goal is now:
                 break
             other = softer(now, goal, depth)
-            way = Sweep(start, self._arm(other))
+            way = start.to(self._arm(other))
             if other is now or not way.hits(self._obstacles):
                 relieved, less = self._bodies_after(now, way)
                 if less < depth:
                     goal, sweep, bodies, depth = other, way, relieved, less
         if depth > JAM_LIMIT:
             bodies = self._frozen(now, sweep.end)
-        return replace(goal, bodies=bodies), sweep.end
+        return goal.with_bodies(bodies), sweep.end
 
-    def _sliding(self, now: Snapshot, goal: Snapshot, start: Arm) -> Snapshot:
+    def _sliding(self, now: Snapshot, goal: Snapshot, start: Posture) -> Snapshot:
         """The goal with the arm raised until it enters nothing; ``now`` if it cannot be raised."""
         for _ in range(MAX_RAISES):
-            sweep = Sweep(start, self._arm(goal))
+            sweep = start.to(self._arm(goal))
             penetration = sweep.deepest_penetration(self._obstacles)
             if penetration is None:
                 return now if sweep.hits(self._obstacles) else goal
-            goal = replace(goal, joints=raised(now.joints, goal.joints, penetration))
+            goal = goal.with_joints(raised(now.joints, goal.joints, penetration))
         return now
 
-    def _arm(self, snapshot: Snapshot) -> Arm:
+    def _arm(self, snapshot: Snapshot) -> Posture:
         held = None if snapshot.held is None else self._scene.free[snapshot.held]
-        return Arm.at(snapshot.joints, snapshot.finger, held, snapshot.grasp)
+        return self._posture_at(snapshot.joints, snapshot.finger, held, snapshot.grasp)
 
-    def _bodies_after(self, now: Snapshot, sweep: Sweep) -> tuple[tuple[BodyState, ...], float]:
+    def _bodies_after(self, now: Snapshot, sweep: Way) -> tuple[tuple[BodyState, ...], float]:
         """The free bodies after the arm's sweep, and how far any overlaps another, m."""
         bodies, depth = list(now.bodies), 0.0
         loose = [i for i in range(len(bodies)) if i != now.held]
         if not self._undisturbed(now, loose, sweep):
-            ways = zip(sweep.start.links, sweep.end.links, strict=True)
-            drives = [Drive.between(start, end) for start, end in ways]
-            after = self._simulation.run(bodies, now.held, drives)
+            after = self._simulation.run(bodies, now.held, sweep.drives())
             depth = self._simulation.deepest()
             came_to_rest = all(_rests(bodies[i], after[i]) for i in loose)
             for i in loose:
@@ -215,20 +242,31 @@ class PandaWorld(SimulatedWorld[Scene]):
             bodies[now.held] = BodyState(sweep.end.held_pose)
         return tuple(bodies), depth
 
-    def _frozen(self, now: Snapshot, end: Arm) -> tuple[BodyState, ...]:
+    def _frozen(self, now: Snapshot, end: Posture) -> tuple[BodyState, ...]:
         """The free bodies as they were, without velocity; the held one with the hand."""
         return tuple(
             BodyState(end.held_pose if i == now.held else body.pose)
             for i, body in enumerate(now.bodies)
         )
 
-    def _undisturbed(self, now: Snapshot, loose: list[int], sweep: Sweep) -> bool:
+    def _undisturbed(self, now: Snapshot, loose: list[int], sweep: Way) -> bool:
         """Whether the bodies stand and the arm stays clear of them: nothing needs computing."""
         bodies = now.bodies
         if not all(bodies[i].still for i in loose):
             return False
-        boxes = [self._scene.free[i].at(bodies[i].pose) for i in loose]
-        return sweep.stays_clear(boxes) and self._stable(now, loose)
+        arrangement = self._arrangement_at(tuple([(i, bodies[i].pose) for i in loose]))
+        if not sweep.stays_clear(arrangement.boxes):
+            return False
+        if arrangement.stable is None:
+            arrangement.stable = self._stable(now, loose)
+        return arrangement.stable
+
+    def _arrangement_at(self, poses: tuple[tuple[int, Pose], ...]) -> _Arrangement:
+        """The boxes around free bodies, which mostly stand where they stood before."""
+        if poses != self._arrangement.poses:
+            boxes = Surroundings(self._scene.free[i].at(pose) for i, pose in poses)
+            self._arrangement = _Arrangement(poses, boxes)
+        return self._arrangement
 
     def _stable(self, now: Snapshot, loose: list[int]) -> bool:
         """Whether bodies without velocity would stay where they are if there were no arm.
@@ -252,7 +290,7 @@ def _half_way(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     """The goal half as far away: what is pressed has more time to give way."""
     del depth
     joints = tuple((a + b) / 2.0 for a, b in zip(now.joints, goal.joints, strict=True))
-    return replace(goal, joints=joints)
+    return goal.with_joints(joints)
 
 
 def _stay(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
@@ -266,7 +304,7 @@ def _hand_raised(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     if goal.joints == now.joints:
         return now
     penetration = Penetration(HAND, grasp_pose(goal.joints).position, depth)
-    return replace(goal, joints=raised(now.joints, goal.joints, penetration))
+    return goal.with_joints(raised(now.joints, goal.joints, penetration))
 
 
 def _rests(before: BodyState, after: BodyState) -> bool:
