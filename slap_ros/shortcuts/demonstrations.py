@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Demonstrations of a shortcut: the skills that it replaces, executed and made shorter.
+
+Nobody writes or records them. Skills lead from the shortcut's start to its target, and
+:mod:`slap_ros.shortcuts.straightening` makes their execution shorter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.core import Domain
+from slap_ros.errors import SlapError
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.problem import Problem
+from slap_ros.relational import State
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.starts import StartRecord, restore_starts, shortest_paths
+from slap_ros.shortcuts.straightening import ChainExecutor, Straightener
+
+MOST_CHAINS = 4  # ways from a start to its target that are executed until one gets there
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """A demonstration as it is written to files and sent to other processes.
+
+    Args:
+        start: Start of the shortcut in which it begins.
+        actions: Actions of the policy, from -1 to 1, one tuple per step.
+        replaced: Environment steps of the skills before their execution was made shorter.
+        environment_steps: Environment steps that it took to find.
+    """
+
+    start: StartRecord
+    actions: tuple[tuple[float, ...], ...]
+    replaced: int
+    environment_steps: int
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        return {
+            "start": self.start.as_json(),
+            "actions": [list(action) for action in self.actions],
+            "replaced": self.replaced,
+            "environment_steps": self.environment_steps,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Demonstration:
+        """The demonstration of :meth:`as_json`.
+
+        Raises:
+            KeyError, TypeError, ValueError: The data is no demonstration.
+        """
+        actions = tuple(tuple(float(value) for value in action) for action in data["actions"])
+        if not actions or len({len(action) for action in actions}) > 1:
+            raise ValueError("its actions are not all of one size")
+        start = StartRecord.from_json(data["start"])
+        return cls(start, actions, int(data["replaced"]), int(data["environment_steps"]))
+
+
+class Demonstrated(NamedTuple):
+    """What a policy learns from: steps of all demonstrations.
+
+    Attributes:
+        observations: Shape (n, size).
+        actions: Shape (n, actions), from -1 to 1.
+        shortest: Environment steps of the shortest demonstration.
+    """
+
+    observations: NDArray[np.float32]
+    actions: NDArray[np.float32]
+    shortest: int
+
+
+def demonstrate(
+    domain: Domain,
+    record: StartRecord,
+    signature: Signature,
+    tries: int,
+    rng: np.random.Generator,
+) -> Demonstration | None:
+    """Execute the skills from a start to its target, and make the execution shorter.
+
+    Args:
+        domain: Domain with the skills.
+        record: Start of the shortcut.
+        signature: Signature of the shortcut.
+        tries: Number of stretches that are tried.
+        rng: Generator that draws the stretches.
+
+    Returns:
+        The demonstration; None where skills do not lead to the target, or with actions that the
+        shortcut has not.
+    """
+    (start,) = restore_starts(domain, [record])
+    problem = Problem.of(domain, start.state)
+    try:
+        graph = build_abstract_graph(
+            start.space.abstract(start.state), start.target, problem.operators
+        )
+    except SlapError:  # no operators lead there
+        return None
+    executor = ChainExecutor(domain, problem.model.space, start.state)
+    encoder = ObservationEncoder(domain, start.space, signature, start.change)
+    straightener = Straightener(domain, encoder, start.state)
+    for chain in _chains(graph):
+        commands = executor.commands(start.state, chain, graph.nodes)
+        found = None if commands is None else straightener.shorten(commands, tries, rng)
+        if commands is not None and found is not None:
+            actions = tuple(tuple(row) for row in found.actions.tolist())
+            steps = executor.steps + straightener.steps
+            return Demonstration(record, actions, len(commands), steps)
+    return None
+
+
+def _chains(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
+    """Yield ways to the target, with the fewest edges first."""
+    goals = set(graph.goal_nodes)
+    to_goal = (path for path in shortest_paths(graph) if path and path[-1].target in goals)
+    for _, path in zip(range(MOST_CHAINS), to_goal, strict=False):
+        yield path
+
+
+def demonstrated(
+    domain: Domain, signature: Signature, demonstrations: Sequence[Demonstration]
+) -> Demonstrated:
+    """Make demonstrations again in the model, to see what a policy observes in them.
+
+    Args:
+        domain: Domain of the demonstrations.
+        signature: Signature of the shortcut.
+        demonstrations: Demonstrations of the shortcut, one at least.
+    """
+    observations, actions = [], []
+    starts = restore_starts(domain, [shown.start for shown in demonstrations])
+    for start, shown in zip(starts, demonstrations, strict=True):
+        encoder = ObservationEncoder(domain, start.space, signature, start.change)
+        whole = np.array(shown.actions)
+        again = Straightener(domain, encoder, start.state).execute(whole)
+        if again is None:  # other physics than when it was made
+            continue
+        seen = State.batch(again.states[:-1])
+        observations.append(encoder.encode(seen).observations)
+        actions.append(again.actions)
+    return Demonstrated(
+        np.concatenate(observations),
+        np.concatenate(actions).astype(np.float32),
+        min(len(shown.actions) for shown in demonstrations),
+    )
