@@ -20,7 +20,7 @@ from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
 from slap_ros.learning.policy_export import exported_layers, hidden_layers, weights_of
 from slap_ros.learning.vec_env import VecEnv
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
-from slap_ros.shortcuts.cloning_settings import CloningSettings
+from slap_ros.shortcuts.cloning_settings import ShortcutCloningSettings
 from slap_ros.shortcuts.demonstrations import Demonstrated
 from slap_ros.shortcuts.normalised_vec_env import NormalisedVecEnv
 from slap_ros.shortcuts.progress import Progress
@@ -35,7 +35,7 @@ class CloningLearner:
         self,
         env: VecEnv,
         normalisation: ObservationNormalisation,
-        settings: CloningSettings,
+        settings: ShortcutCloningSettings,
         seed: int,
         shown: Demonstrated,
     ) -> None:

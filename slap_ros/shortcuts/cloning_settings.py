@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class CloningSettings:
+class ShortcutCloningSettings:
     """Hyper-parameters of cloning, under the names of stable-baselines3 where it has them.
 
     Args:
@@ -30,7 +30,7 @@ class CloningSettings:
     epochs: int = 300
     batch_size: int = 128
     learning_rate: float = 1e-3
-    net_arch: tuple[int, ...] = (64, 64)
+    net_arch: tuple[int, ...] = (128, 128)
     noise: float = 0.05
     gamma: float = 0.97
     n_envs: int = 16

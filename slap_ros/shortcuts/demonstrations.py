@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core import Domain
-from slap_ros.errors import SlapError
+from slap_ros.errors import InvalidParameterError, SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
@@ -29,7 +30,7 @@ MOST_CHAINS = 4  # ways from a start to its target that are executed until one g
 
 
 @dataclass(frozen=True)
-class Demonstration:
+class ShortcutDemonstration:
     """A demonstration as it is written to files and sent to other processes.
 
     Args:
@@ -54,7 +55,7 @@ class Demonstration:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Demonstration:
+    def from_json(cls, data: Mapping[str, Any]) -> ShortcutDemonstration:
         """The demonstration of :meth:`as_json`.
 
         Raises:
@@ -87,7 +88,7 @@ def demonstrate(
     signature: Signature,
     tries: int,
     rng: np.random.Generator,
-) -> Demonstration | None:
+) -> ShortcutDemonstration | None:
     """Execute the skills from a start to its target, and make the execution shorter.
 
     Args:
@@ -118,20 +119,19 @@ def demonstrate(
         if commands is not None and found is not None:
             actions = tuple(tuple(row) for row in found.actions.tolist())
             steps = executor.steps + straightener.steps
-            return Demonstration(record, actions, len(commands), steps)
+            return ShortcutDemonstration(record, actions, len(commands), steps)
     return None
 
 
 def _chains(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
-    """Yield ways to the target, with the fewest edges first."""
+    """Ways to the target, those with the fewest edges first."""
     goals = set(graph.goal_nodes)
     to_goal = (path for path in shortest_paths(graph) if path and path[-1].target in goals)
-    for _, path in zip(range(MOST_CHAINS), to_goal, strict=False):
-        yield path
+    return islice(to_goal, MOST_CHAINS)
 
 
 def demonstrated(
-    domain: Domain, signature: Signature, demonstrations: Sequence[Demonstration]
+    domain: Domain, signature: Signature, demonstrations: Sequence[ShortcutDemonstration]
 ) -> Demonstrated:
     """Make demonstrations again in the model, to see what a policy observes in them.
 
@@ -139,6 +139,12 @@ def demonstrated(
         domain: Domain of the demonstrations.
         signature: Signature of the shortcut.
         demonstrations: Demonstrations of the shortcut, one at least.
+
+    Returns:
+        The steps of those that end in the target again, in their order.
+
+    Raises:
+        InvalidParameterError: None does: they were made in another physics.
     """
     observations, actions = [], []
     starts = restore_starts(domain, [shown.start for shown in demonstrations])
@@ -146,11 +152,16 @@ def demonstrated(
         encoder = ObservationEncoder(domain, start.space, signature, start.change)
         whole = np.array(shown.actions)
         again = Straightener(domain, encoder, start.state).execute(whole)
-        if again is None:  # other physics than when it was made
+        if again is None:
             continue
         seen = State.batch(again.states[:-1])
         observations.append(encoder.encode(seen).observations)
         actions.append(again.actions)
+    if not actions:
+        raise InvalidParameterError(
+            f"no demonstration of {signature.name} ends in its target again; remove the work "
+            "folder to make others"
+        )
     return Demonstrated(
         np.concatenate(observations),
         np.concatenate(actions).astype(np.float32),

@@ -24,7 +24,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.policies.mlp_policy import ObservationNormalisation
 from slap_ros.shortcuts.demonstrations import (
     Demonstrated,
-    Demonstration,
+    ShortcutDemonstration,
     demonstrate,
     demonstrated,
 )
@@ -157,8 +157,8 @@ def demonstration(
         tries: Number of stretches that are tried to make the skills' execution shorter.
 
     Returns:
-        A :class:`~slap_ros.shortcuts.demonstrations.Demonstration` as JSON; None where skills do
-        not show the shortcut.
+        A :class:`~slap_ros.shortcuts.demonstrations.ShortcutDemonstration` as JSON; None where
+        skills do not show the shortcut.
     """
     rng = np.random.default_rng([distribution.seed, STARTS.first, start.index])
     found = demonstrate(distribution.make_domain(), start, signature, tries, rng)
@@ -283,7 +283,7 @@ class LearningAttempt:
     number: int = 0
     validation: tuple[int, ...] = ()
     learned: tuple[Shortcut, ...] = ()
-    demonstrations: tuple[Demonstration, ...] = ()
+    demonstrations: tuple[ShortcutDemonstration, ...] = ()
 
     @property
     def work(self) -> ShortcutWorkFolder:

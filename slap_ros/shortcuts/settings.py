@@ -13,7 +13,7 @@ from slap_ros.core import Domain, SettingValue
 from slap_ros.errors import InvalidDomainError, InvalidParameterError
 from slap_ros.learning.setting_changes import changed
 from slap_ros.learning.stored_keys import restored, stored
-from slap_ros.shortcuts.cloning_settings import CloningSettings
+from slap_ros.shortcuts.cloning_settings import ShortcutCloningSettings
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.sac_settings import ShortcutSacSettings
@@ -82,7 +82,7 @@ class ExplorationSettings:
         return cls(**restored(cls, data))
 
 
-StageSettings = PpoSettings | ShortcutSacSettings | CloningSettings
+StageSettings = PpoSettings | ShortcutSacSettings | ShortcutCloningSettings
 ENOUGH_SUCCESS = 0.5  # share of the last episodes of the first stage: no further attempt
 LEARN = PpoSettings(total_steps=250_000)
 POLISH = PpoSettings(
@@ -148,7 +148,7 @@ class TrainingSettings:
     sac: ShortcutSacSettings | None = None
     together: int = 1
     budget: int = 0
-    cloning: CloningSettings | None = None
+    cloning: ShortcutCloningSettings | None = None
 
     @property
     def stages(self) -> tuple[StageSettings, ...]:
@@ -265,7 +265,7 @@ CHAINS = "ours_chains"  # settings that clone executions of two skills, made sho
 _CHAINS: Mapping[str, SettingValue] = {
     "exploration.rollouts": 1,
     "exploration.straightened": 40,
-    "cloning.straightened": CloningSettings().straightened,
+    "cloning.straightened": ShortcutCloningSettings().straightened,
     "starts": 200,
     "horizon": 60,
 }

@@ -8,7 +8,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.vec_env import VecEnv
 from slap_ros.policies.mlp_policy import ObservationNormalisation
 from slap_ros.shortcuts.cloning import CloningLearner
-from slap_ros.shortcuts.cloning_settings import CloningSettings
+from slap_ros.shortcuts.cloning_settings import ShortcutCloningSettings
 from slap_ros.shortcuts.demonstrations import Demonstrated
 from slap_ros.shortcuts.ppo import Learner
 from slap_ros.shortcuts.ppo_settings import PpoSettings
@@ -39,7 +39,7 @@ def make_learner(
     """
     if isinstance(settings, PpoSettings):
         return Learner(env, normalisation, settings, seed)
-    if not isinstance(settings, CloningSettings):
+    if not isinstance(settings, ShortcutCloningSettings):
         return SacLearner(env, normalisation, settings, seed)
     if shown is None:
         raise InvalidParameterError(

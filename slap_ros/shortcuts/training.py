@@ -22,7 +22,7 @@ from slap_ros.learning.task_range import TaskRange
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.demonstrations import Demonstration
+from slap_ros.shortcuts.demonstrations import ShortcutDemonstration
 from slap_ros.shortcuts.exploration_policies import RANDOM
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.progress import Progress
@@ -385,7 +385,7 @@ class Training:
 
     def _demonstrations(
         self, signature: Signature, starts: tuple[StartRecord, ...]
-    ) -> tuple[Demonstration, ...]:
+    ) -> tuple[ShortcutDemonstration, ...]:
         """Demonstrations of a shortcut, for cloning."""
         cloning = self.settings.cloning
         if cloning is None:
@@ -395,14 +395,16 @@ class Training:
             self._work,
             f"{signature.name}/demonstrations",
             lambda finished: self._run("straightening skills", jobs.demonstration, work, finished),
-            lambda data: tuple(Demonstration.from_json(one) for one in data if one is not None),
+            lambda data: tuple(
+                ShortcutDemonstration.from_json(one) for one in data if one is not None
+            ),
         )
 
     def _learn(
         self,
         signature: Signature,
         starts: tuple[StartRecord, ...],
-        shown: tuple[Demonstration, ...] = (),
+        shown: tuple[ShortcutDemonstration, ...] = (),
     ) -> Shortcut:
         """Learn a shortcut in the most successful of as many attempts as it takes."""
         if self.settings.attempts == 1:
@@ -426,7 +428,7 @@ class Training:
         signature: Signature,
         starts: tuple[StartRecord, ...],
         number: int,
-        shown: tuple[Demonstration, ...],
+        shown: tuple[ShortcutDemonstration, ...],
     ) -> jobs.LearningAttempt:
         """An attempt to learn a shortcut.
 
@@ -528,7 +530,7 @@ def with_origin(shortcut: Shortcut, group: CandidateGroup) -> Shortcut:
     return replace(shortcut, record={**shortcut.record, "found_by": list(group.found_by)})
 
 
-def with_demonstrations(shortcut: Shortcut, shown: Sequence[Demonstration]) -> Shortcut:
+def with_demonstrations(shortcut: Shortcut, shown: Sequence[ShortcutDemonstration]) -> Shortcut:
     """The shortcut, whose record counts demonstrations and the environment steps they took."""
     if not shown:
         return shortcut

@@ -14,7 +14,7 @@ from slap_ros.learning.workers import SequentialWorkers, local_workers
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.action_map import ActionMap
-from slap_ros.shortcuts.demonstrations import Demonstration, demonstrate, demonstrated
+from slap_ros.shortcuts.demonstrations import ShortcutDemonstration, demonstrate, demonstrated
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.settings import CHAINS, ExplorationSettings, training_settings
 from slap_ros.shortcuts.starts import find_start
@@ -91,7 +91,7 @@ def test_a_demonstration_is_shorter_than_the_skills_and_ends_in_the_target(pegs,
     shown = show()
     assert len(shown.actions) < 0.9 * shown.replaced
     assert shown == show()
-    assert Demonstration.from_json(shown.as_json()) == shown
+    assert ShortcutDemonstration.from_json(shown.as_json()) == shown
     learned_from = demonstrated(pegs, candidate.signature, [shown])  # the model made it again
     assert len(learned_from.observations) == len(learned_from.actions) == len(shown.actions)
     assert learned_from.shortest == len(shown.actions)
