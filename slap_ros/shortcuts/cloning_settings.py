@@ -27,7 +27,7 @@ class ShortcutCloningSettings:
     """
 
     straightened: int = 120
-    epochs: int = 300
+    epochs: int = 150
     batch_size: int = 128
     learning_rate: float = 1e-3
     net_arch: tuple[int, ...] = (128, 128)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, permutations, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,12 +21,17 @@ from slap_ros.errors import InvalidParameterError, SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
-from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.observation_encoder import (
+    ObservationEncoder,
+    ObservationLayout,
+    observation_layout,
+)
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, restore_starts, shortest_paths
 from slap_ros.shortcuts.straightening import ChainExecutor, Straightener
 
-MOST_CHAINS = 4  # ways from a start to its target that are executed until one gets there
+MOST_ORDERS = 24  # of the objects in an observation that are learned from
+MOST_WAYS = 4  # ways from a start to its target that are executed until one gets there
 
 
 @dataclass(frozen=True)
@@ -113,8 +118,8 @@ def demonstrate(
     executor = ChainExecutor(domain, problem.model.space, start.state)
     encoder = ObservationEncoder(domain, start.space, signature, start.change)
     straightener = Straightener(domain, encoder, start.state)
-    for chain in _chains(graph):
-        commands = executor.commands(start.state, chain, graph.nodes)
+    for way in _ways(graph):
+        commands = executor.commands(start.state, way, graph.nodes)
         found = None if commands is None else straightener.shorten(commands, tries, rng)
         if commands is not None and found is not None:
             actions = tuple(tuple(row) for row in found.actions.tolist())
@@ -123,11 +128,11 @@ def demonstrate(
     return None
 
 
-def _chains(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
+def _ways(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
     """Ways to the target, those with the fewest edges first."""
     goals = set(graph.goal_nodes)
     to_goal = (path for path in shortest_paths(graph) if path and path[-1].target in goals)
-    return islice(to_goal, MOST_CHAINS)
+    return islice(to_goal, MOST_WAYS)
 
 
 def demonstrated(
@@ -141,7 +146,8 @@ def demonstrated(
         demonstrations: Demonstrations of the shortcut, one at least.
 
     Returns:
-        The steps of those that end in the target again, in their order.
+        The steps of those that end in the target again, once for each order of the objects of a
+        kind: which of them comes first is a matter of their names.
 
     Raises:
         InvalidParameterError: None does: they were made in another physics.
@@ -162,8 +168,32 @@ def demonstrated(
             f"no demonstration of {signature.name} ends in its target again; remove the work "
             "folder to make others"
         )
+    layout = observation_layout(domain, signature, starts[0].state)
+    assert layout is not None  # the task has the shortcut's objects
+    orders = list(slot_orders(layout))
+    seen_once = np.concatenate(observations)
     return Demonstrated(
-        np.concatenate(observations),
-        np.concatenate(actions).astype(np.float32),
+        np.concatenate([seen_once[:, order] for order in orders]),
+        np.tile(np.concatenate(actions).astype(np.float32), (len(orders), 1)),
         min(len(shown.actions) for shown in demonstrations),
     )
+
+
+def slot_orders(layout: ObservationLayout) -> Iterator[NDArray[np.intp]]:
+    """Yield the columns of an observation in which the objects of a kind have other slots.
+
+    Args:
+        layout: Layout of the observation.
+
+    Yields:
+        Shape (size,); the first order is that of the observation, and there are no more than
+        ``MOST_ORDERS``.
+    """
+    begin, kinds = layout.robot, []
+    for kind, count in layout.slots.items():
+        slots = np.arange(begin, begin + count * layout.widths[kind]).reshape(count, -1)
+        kinds.append([slots[list(order)].ravel() for order in permutations(range(count))])
+        begin += slots.size
+    robot = np.arange(layout.robot)
+    for orders in islice(product(*kinds), MOST_ORDERS):
+        yield np.concatenate([robot, *orders])
