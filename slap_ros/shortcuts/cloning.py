@@ -76,9 +76,11 @@ class CloningLearner:
             return
         self._clone()
         rng, policy = np.random.default_rng([self._seed, len(self._shown.actions)]), self.policy()
+        observations = self._raw.observations
         while self._steps < self.settings.total_steps:
-            actions = policy.sample(self._raw.observations, rng)
+            actions = policy.sample(observations, rng)
             step = self._raw.step(actions.astype(np.float64))
+            observations = step.observations
             self._steps += self._raw.num_envs
             for i in np.flatnonzero(step.dones).tolist():
                 self._env.count(step, i)

@@ -164,6 +164,7 @@ def test_a_shortcut_is_cloned_and_shortens_plans_and_any_processes_learn_the_sam
     assert kept and after < before
     (shortcut,) = library.shortcuts
     assert shortcut.record["found_by"] == [STRAIGHTENED]
+    assert shortcut.record["success"] > 0.0  # of episodes with noise, without a choice of the best
     shown = shortcut.record["demonstrations"]
     assert 20 <= shown["number"] <= 40
     assert shown["straightened"] < shown["skills"]
