@@ -51,9 +51,9 @@ class TrainOptions:
         typer.Option(
             help="Hyper-parameters: ours, ours_short (ends as soon as plans get no shorter), "
             "ours_several (more shortcuts, also for random goals), ours_near (explores with pushes "
-            "at objects, and beyond what operators reach), subgoals (one policy for several "
-            "shortcuts), paper (the paper's), or the name of the "
-            "domain's own."
+            "at objects, and beyond what operators reach), ours_chains (clones two skills in a "
+            "row, made shorter), subgoals (one policy for several shortcuts), paper (the paper's), "
+            "or the name of the domain's own."
         ),
     ] = "ours"
     set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None

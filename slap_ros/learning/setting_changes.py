@@ -34,6 +34,7 @@ ZERO_TOO = frozenset(
         "pushes",
         "refinements",
         "shortcuts",
+        "straightened",
     }
 )
 BELOW_1 = math.nextafter(1.0, 0.0)

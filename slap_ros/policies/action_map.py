@@ -31,3 +31,15 @@ class ActionMap:
         scaled = self._half * np.minimum(np.maximum(actions, -1.0), 1.0)
         mapped[..., self.axes] = self._middle + scaled
         return mapped
+
+    def inverse(self, commands: Array) -> Array:
+        """The actions that are mapped to these commands of the robot, or come next to them.
+
+        Args:
+            commands: Robot's actions, shape (..., axes).
+
+        Returns:
+            Shape (..., size), from -1 to 1.
+        """
+        actions: Array = (commands[..., self.axes] - self._middle) / self._half
+        return np.minimum(np.maximum(actions, -1.0), 1.0)

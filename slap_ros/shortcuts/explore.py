@@ -39,6 +39,8 @@ from slap_ros.shortcuts.exploration_steps import exploration_worlds, most_rollou
 from slap_ros.shortcuts.rollout_origins import OptionRetracer, RolloutOrigin
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
+from slap_ros.shortcuts.straightened_chains import StraightenedChains
+from slap_ros.shortcuts.straightening import STRAIGHTENED
 from slap_ros.shortcuts.way_on import WayOn, steps_to_goal
 
 OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
@@ -274,12 +276,44 @@ class Explorer:
                 target = self._destination(origin, abstract, reached, to_go, operator_steps)
                 if target is not None:
                     candidates += self._candidates(origin, target, reached)
+        if self._settings.straightened:
+            candidates += self._straightened(vertices, to_go)
         return ExplorationResult(
             tuple(candidate for candidate in candidates if candidate.expected_saving > 0.0),
             len(self.graph.candidates()),
             self._taken,
             operator_steps,
         )
+
+    def _straightened(
+        self, vertices: Sequence[Vertex], to_go: Sequence[float]
+    ) -> Iterator[ShortcutCandidate]:
+        """Yield the candidates that two skills show, executed one after the other and straightened.
+
+        Args:
+            vertices: Vertices in which the first of the skills may begin.
+            to_go: Estimated environment steps from each node to a goal.
+        """
+        chains = StraightenedChains(self._domain, self._problem, self.graph)
+        nodes, tries = self.graph.nodes, self._settings.straightened
+        for vertex in vertices:
+            for pair in chains.leading_from(vertex.node):
+                end = pair[1].target
+                useful = vertex.g + to_go[end] < self._plan.predicted_steps
+                if not useful or (nodes[vertex.node], nodes[end]) in self._joined:
+                    continue
+                if chains.most_steps(pair, tries) > self._left:
+                    return
+                before = chains.steps
+                found = chains.straighten(vertex.state, vertex.node, pair, tries, self._rng)
+                self._steps += chains.steps - before
+                if found is not None:
+                    reached = _Reached(found.states[-1], found.steps, [found.steps])
+                    reached.found_by[STRAIGHTENED] = None
+                    target = _Destination(nodes[end], to_go[end], beyond=False)
+                    yield self._candidate(
+                        vertex, RolloutOrigin(vertex, vertex.state), target, reached
+                    )
 
     @property
     def _taken(self) -> int:

@@ -21,6 +21,13 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.task_range import TaskRange
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
+from slap_ros.policies.mlp_policy import ObservationNormalisation
+from slap_ros.shortcuts.demonstrations import (
+    Demonstrated,
+    ShortcutDemonstration,
+    demonstrate,
+    demonstrated,
+)
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.progress import (
@@ -138,6 +145,26 @@ def start(
     return None if found is None else found.as_json()
 
 
+def demonstration(
+    distribution: TaskDistribution, start: StartRecord, signature: Signature, tries: int
+) -> dict[str, Any] | None:
+    """A demonstration of a shortcut; see :func:`~slap_ros.shortcuts.demonstrations.demonstrate`.
+
+    Args:
+        distribution: Distribution from which the start's task is drawn.
+        start: Start of the shortcut.
+        signature: Signature of the shortcut.
+        tries: Number of stretches that are tried to make the skills' execution shorter.
+
+    Returns:
+        A :class:`~slap_ros.shortcuts.demonstrations.ShortcutDemonstration` as JSON; None where
+        skills do not show the shortcut.
+    """
+    rng = np.random.default_rng([distribution.seed, STARTS.first, start.index])
+    found = demonstrate(distribution.make_domain(), start, signature, tries, rng)
+    return None if found is None else found.as_json()
+
+
 def plan_length(
     distribution: TaskDistribution, index: int, shortcuts: tuple[Shortcut, ...], sampling: Sampling
 ) -> int | str:
@@ -223,6 +250,10 @@ class StagedAttempt(Protocol):
         """The parts of a stage's environments."""
         ...
 
+    def shown(self) -> Demonstrated | None:
+        """Steps of demonstrations to learn from; None where there are none."""
+        ...
+
     def plan_lengths(self, learner: SavableLearner) -> PlanLengths | None:
         """The validations while it is learned; None where no rule asks for them."""
         ...
@@ -241,6 +272,7 @@ class LearningAttempt:
         number: Number of the attempt, counted from 0; each has other initial weights and noise.
         validation: Indices of the validation tasks that have a plan.
         learned: Shortcuts that were learned before, and are used beside this one.
+        demonstrations: Demonstrations of the shortcut.
     """
 
     distribution: TaskDistribution
@@ -251,6 +283,7 @@ class LearningAttempt:
     number: int = 0
     validation: tuple[int, ...] = ()
     learned: tuple[Shortcut, ...] = ()
+    demonstrations: tuple[ShortcutDemonstration, ...] = ()
 
     @property
     def work(self) -> ShortcutWorkFolder:
@@ -273,6 +306,12 @@ class LearningAttempt:
     def recorder(self) -> ProgressRecorder:
         """The recorder of the attempt's progress."""
         return SnapshotRecorder(self.work, self.signature, self.settings.total_steps)
+
+    def shown(self) -> Demonstrated | None:
+        """Steps of the demonstrations to learn from; None where there are none."""
+        if not self.demonstrations:
+            return None
+        return demonstrated(self.distribution.make_domain(), self.signature, self.demonstrations)
 
     def plan_lengths(self, learner: SavableLearner) -> PlanLengths | None:
         """The validations while the shortcut is learned; None where no rule asks for them.
@@ -380,12 +419,16 @@ def learn_stages(
 
     work = attempt.work
     rng = np.random.default_rng([attempt.seed, len(attempt.starts)])
-    normalisation = normalisation_of(attempt.parts(0)[0].make(), rng, WARM_UP)
+    shown = attempt.shown()
+    if shown is None:
+        normalisation = normalisation_of(attempt.parts(0)[0].make(), rng, WARM_UP)
+    else:  # random actions lead elsewhere
+        normalisation = ObservationNormalisation.of(shown.observations)
     learner: StageLearner | None = None
     for stage, settings in enumerate(attempt.settings.stages[:stages]):
         with make_vec_env(attempt.parts(stage), processes) as env:
             earlier = learner
-            learner = make_learner(env, normalisation, settings, attempt.seed)
+            learner = make_learner(env, normalisation, settings, attempt.seed, shown)
             if isinstance(earlier, Learner) and isinstance(learner, Learner):
                 learner.initialise_from(earlier)
             if work.checkpoint(stage).exists():

@@ -13,6 +13,7 @@ from slap_ros.core import Domain, SettingValue
 from slap_ros.errors import InvalidDomainError, InvalidParameterError
 from slap_ros.learning.setting_changes import changed
 from slap_ros.learning.stored_keys import restored, stored
+from slap_ros.shortcuts.cloning_settings import ShortcutCloningSettings
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.sac_settings import ShortcutSacSettings
@@ -41,6 +42,9 @@ class ExplorationSettings:
         beyond: Whether abstract states count that operators reach in no plan.
         budget: Environment steps of a task; no rollouts are begun that could take more. 0 for no
             such limit.
+        straightened: Number of stretches that are tried to make the execution of two skills, one
+            after the other, shorter (:mod:`slap_ros.shortcuts.straightening`); 0 for no such
+            executions.
     """
 
     tasks: int = 4
@@ -54,6 +58,7 @@ class ExplorationSettings:
     inside: int = 0
     beyond: bool = False
     budget: int = 0
+    straightened: int = 0
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
@@ -62,7 +67,7 @@ class ExplorationSettings:
         where there is none, as work folders have it from when there was no other way.
         """
         data = stored(self)
-        for name in ("also_repeat", "pushes", "inside", "beyond", "budget"):
+        for name in ("also_repeat", "pushes", "inside", "beyond", "budget", "straightened"):
             if not data[name]:
                 del data[name]
         return data
@@ -77,6 +82,7 @@ class ExplorationSettings:
         return cls(**restored(cls, data))
 
 
+StageSettings = PpoSettings | ShortcutSacSettings | ShortcutCloningSettings
 ENOUGH_SUCCESS = 0.5  # share of the last episodes of the first stage: no further attempt
 LEARN = PpoSettings(total_steps=250_000)
 POLISH = PpoSettings(
@@ -121,6 +127,8 @@ class TrainingSettings:
             1 for a policy each.
         budget: Environment steps of exploring and of learning all shortcuts together; no shortcut
             is begun that could take more. 0 for no such limit.
+        cloning: Settings of cloning, which learns in the place of PPO, in a single stage, from
+            straightened executions of skills; None for PPO.
     """
 
     exploration: ExplorationSettings = field(default_factory=ExplorationSettings)
@@ -140,10 +148,13 @@ class TrainingSettings:
     sac: ShortcutSacSettings | None = None
     together: int = 1
     budget: int = 0
+    cloning: ShortcutCloningSettings | None = None
 
     @property
-    def stages(self) -> tuple[PpoSettings | ShortcutSacSettings, ...]:
+    def stages(self) -> tuple[StageSettings, ...]:
         """The learner's hyper-parameters, stage after stage."""
+        if self.cloning is not None:
+            return (self.cloning,)
         if self.sac is not None:
             return (self.sac,)
         return (self.ppo,) if self.polish is None else (self.ppo, self.polish)
@@ -168,7 +179,10 @@ class TrainingSettings:
             ceil(stage.total_steps / stage.rollout_steps) * stage.rollout_steps
             for stage in self.stages
         ]
-        return sum(each) + (self.attempts - 1) * each[0]
+        showing = 0
+        if self.cloning is not None:  # each try ends with the horizon at the latest, as a rule
+            showing = self.starts * (self.cloning.straightened + 2) * self.horizon
+        return showing + sum(each) + (self.attempts - 1) * each[0]
 
     def with_total_steps(self, steps: int) -> TrainingSettings:
         """As many environment steps in all, shared among the stages as they are now.
@@ -178,6 +192,8 @@ class TrainingSettings:
         """
         if steps < len(self.stages):
             raise InvalidParameterError(f"{len(self.stages)} stages cannot share {steps} steps")
+        if self.cloning is not None:
+            return replace(self, cloning=replace(self.cloning, total_steps=steps))
         if self.sac is not None:
             return replace(self, sac=replace(self.sac, total_steps=steps))
         if self.polish is None:
@@ -194,11 +210,12 @@ class TrainingSettings:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
 
         A single attempt, no other goals, no rule that ends learning, no SAC, a policy for each
-        shortcut and no budget are left out, as work folders have it from when there was no other
-        way.
+        shortcut, no budget and no cloning are left out, as work folders have it from when there
+        was no other way.
         """
         data = stored(self)
-        for name in ("attempts", "random_goals", "stopping", "sac", "together", "budget"):
+        optional = ("attempts", "random_goals", "stopping", "sac", "together", "budget", "cloning")
+        for name in optional:
             if getattr(self, name) == getattr(OURS, name):
                 del data[name]
         return data
@@ -244,6 +261,14 @@ _NEAR: Mapping[str, SettingValue] = {
     "exploration.inside": 8,
     "exploration.beyond": True,
 }
+CHAINS = "ours_chains"  # settings that clone executions of two skills, made shorter
+_CHAINS: Mapping[str, SettingValue] = {
+    "exploration.rollouts": 1,
+    "exploration.straightened": 40,
+    "cloning.straightened": ShortcutCloningSettings().straightened,
+    "starts": 200,
+    "horizon": 60,
+}
 SUBGOALS = "subgoals"  # settings that learn one policy for several shortcuts
 _SUBGOALS: Mapping[str, SettingValue] = {"together": 4, "attempts": 1}
 SAC = "sac"  # settings that learn with SAC in the place of PPO
@@ -258,6 +283,7 @@ _VARIANTS = {
     SEVERAL: _SEVERAL,
     SHORT: _SHORT,
     NEAR: _NEAR,
+    CHAINS: _CHAINS,
     SUBGOALS: _SUBGOALS,
     SAC: _SAC,
     ABSTRACT_HER: _ABSTRACT_HER,

@@ -175,7 +175,7 @@ def _nearest_to_goal_first(
 ) -> list[tuple[tuple[Edge, ...], int, int]]:
     """Paths to where a shortcut may begin, with the nodes where it begins and ends."""
     choices = []
-    paths = _shortest_paths(graph) if operator_path is None else _paths(graph, operator_path)
+    paths = shortest_paths(graph) if operator_path is None else _paths(graph, operator_path)
     for path in paths:
         source = path[-1].target if path else 0
         targets = matcher.targets(graph.nodes, source)
@@ -183,7 +183,7 @@ def _nearest_to_goal_first(
     return sorted(choices, key=lambda choice: to_go[choice[2]])
 
 
-def _shortest_paths(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
+def shortest_paths(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
     """A sequence of edges from the initial state to each node, with as few edges as can be."""
     forward = graph.forward_edges()
     found: dict[int, tuple[Edge, ...]] = {0: ()}

@@ -74,6 +74,9 @@ class SubgoalAttempt:
         """The folder, which is made where there is none."""
         return ShortcutWorkFolder(Path(self.folder))
 
+    def shown(self) -> None:
+        """No demonstrations; see :class:`~slap_ros.shortcuts.jobs.StagedAttempt`."""
+
     def plan_lengths(self, learner: SavableLearner) -> None:
         """No rule ends learning early; see :class:`~slap_ros.shortcuts.jobs.StagedAttempt`."""
         del learner

@@ -22,6 +22,7 @@ from slap_ros.learning.task_range import TaskRange
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts.demonstrations import ShortcutDemonstration
 from slap_ros.shortcuts.exploration_policies import RANDOM
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.progress import Progress
@@ -273,7 +274,10 @@ class Training:
         starts = self._starts(group, operator_steps)
         if not starts:  # it can begin in no task
             return length
-        learned = self._learn(group.signature, starts)
+        shown = self._demonstrations(group.signature, starts)
+        if self.settings.cloning is not None and not shown:  # skills do not show it
+            return length
+        learned = with_demonstrations(self._learn(group.signature, starts, shown), shown)
         self._spent += int(learned.record.get("environment_steps", 0))
         return self._judge(with_origin(learned, group), length)
 
@@ -379,26 +383,52 @@ class Training:
             lambda data: tuple(StartRecord.from_json(one) for one in data if one is not None),
         )
 
-    def _learn(self, signature: Signature, starts: tuple[StartRecord, ...]) -> Shortcut:
+    def _demonstrations(
+        self, signature: Signature, starts: tuple[StartRecord, ...]
+    ) -> tuple[ShortcutDemonstration, ...]:
+        """Demonstrations of a shortcut, for cloning."""
+        cloning = self.settings.cloning
+        if cloning is None:
+            return ()
+        work = [(self.distribution, start, signature, cloning.straightened) for start in starts]
+        return cached_jobs(
+            self._work,
+            f"{signature.name}/demonstrations",
+            lambda finished: self._run("straightening skills", jobs.demonstration, work, finished),
+            lambda data: tuple(
+                ShortcutDemonstration.from_json(one) for one in data if one is not None
+            ),
+        )
+
+    def _learn(
+        self,
+        signature: Signature,
+        starts: tuple[StartRecord, ...],
+        shown: tuple[ShortcutDemonstration, ...] = (),
+    ) -> Shortcut:
         """Learn a shortcut in the most successful of as many attempts as it takes."""
         if self.settings.attempts == 1:
-            return self._run_attempt(jobs.learn, self._attempt(signature, starts, 0))
+            return self._run_attempt(jobs.learn, self._attempt(signature, starts, 0, shown))
         first_stages: list[Progress] = []
         while len(first_stages) < self.settings.attempts:
-            attempt = self._attempt(signature, starts, len(first_stages))
+            attempt = self._attempt(signature, starts, len(first_stages), shown)
             first_stages.append(self._run_attempt(jobs.learn_first_stage, attempt))
             if first_stages[-1].success >= ENOUGH_SUCCESS:
                 break
         success = [stage.success for stage in first_stages]
         best = success.index(max(success))
-        shortcut = self._run_attempt(jobs.learn, self._attempt(signature, starts, best))
+        shortcut = self._run_attempt(jobs.learn, self._attempt(signature, starts, best, shown))
         in_vain = sum(stage.steps for i, stage in enumerate(first_stages) if i != best)
         steps = int(shortcut.record["environment_steps"]) + in_vain
         record = {**shortcut.record, "environment_steps": steps, "attempts": len(success)}
         return replace(shortcut, record=record)
 
     def _attempt(
-        self, signature: Signature, starts: tuple[StartRecord, ...], number: int
+        self,
+        signature: Signature,
+        starts: tuple[StartRecord, ...],
+        number: int,
+        shown: tuple[ShortcutDemonstration, ...],
     ) -> jobs.LearningAttempt:
         """An attempt to learn a shortcut.
 
@@ -406,6 +436,7 @@ class Training:
             signature: Signature of the shortcut.
             starts: Initial states of episodes.
             number: Number of the attempt, counted from 0.
+            shown: Demonstrations of the shortcut.
         """
         folder = attempt_folder(self.folder, signature.name, number)
         return jobs.LearningAttempt(
@@ -417,6 +448,7 @@ class Training:
             number,
             tuple(self._validation),
             tuple(self._shortcuts),
+            shown,
         )
 
     def _run_attempt(
@@ -496,6 +528,23 @@ def with_origin(shortcut: Shortcut, group: CandidateGroup) -> Shortcut:
     if group.found_by == (RANDOM,):
         return shortcut
     return replace(shortcut, record={**shortcut.record, "found_by": list(group.found_by)})
+
+
+def with_demonstrations(shortcut: Shortcut, shown: Sequence[ShortcutDemonstration]) -> Shortcut:
+    """The shortcut, whose record counts demonstrations and the environment steps they took."""
+    if not shown:
+        return shortcut
+    steps = sum(one.environment_steps for one in shown)
+    counts = {
+        "environment_steps": int(shortcut.record["environment_steps"]) + steps,
+        "demonstrations": {
+            "number": len(shown),
+            "environment_steps": steps,
+            "skills": fmean(one.replaced for one in shown),
+            "straightened": fmean(len(one.actions) for one in shown),
+        },
+    }
+    return replace(shortcut, record={**shortcut.record, **counts})
 
 
 def mean_steps(explored: Sequence[ExplorationResult]) -> dict[str, float]:

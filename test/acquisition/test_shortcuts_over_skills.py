@@ -536,6 +536,16 @@ def test_libraries_that_ship_together_are_those_that_were_evaluated(name):
     assert evaluated["library"]["digest"] == library.digest
 
 
+def test_the_library_that_two_skills_show_is_the_one_that_was_evaluated():
+    models = Path(__file__).parents[2] / "models"
+    skills = str(models / "skills" / "peg_in_hole")
+    bench = open_domain(DomainChoice("peg_in_hole", "fair", skills))
+    evaluated = json.loads((models / "chains" / "peg_in_hole" / "evaluation.json").read_text())
+    assert evaluated["skills"]["digest"] == bench.configuration["skills_digest"]
+    library = chosen_library(str(models / "chains" / "peg_in_hole" / "shortcuts"), bench)
+    assert evaluated["library"]["digest"] == library.digest
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # plans in contact, with the paper's search as well
 def test_the_join_that_ships_belongs_together_and_saves_steps():

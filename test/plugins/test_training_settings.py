@@ -14,6 +14,7 @@ from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError
 from slap_ros.learning.setting_changes import changed, parse_changes, setting_names
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
+from slap_ros.shortcuts.cloning_settings import ShortcutCloningSettings
 from slap_ros.shortcuts.sac_settings import ShortcutSacSettings
 from slap_ros.shortcuts.settings import GENERAL, OURS, TrainingSettings, training_settings
 from slap_ros.shortcuts.stopping import Stopping
@@ -70,7 +71,11 @@ def test_a_wrong_name_lists_the_right_ones_on_the_command_line():
 @pytest.mark.parametrize("name", list(setting_names(TrainingSettings)))
 def test_every_setting_can_be_set_to_what_it_is(name):
     """By text, so that nothing of a type that text cannot give is forgotten."""
-    every = {"stopping": Stopping(), "sac": ShortcutSacSettings()}
+    every = {
+        "stopping": Stopping(),
+        "sac": ShortcutSacSettings(),
+        "cloning": ShortcutCloningSettings(),
+    }
     settings = replace(OURS, polish_rewards=OURS.rewards, **every)
     value = settings
     for part in name.split("."):
@@ -117,7 +122,7 @@ def test_a_domains_own_settings_are_used_and_changed():
     assert (several.polish, several.shortcuts, several.random_goals) == (None, 8, 0.5)
     short = training_settings("ours_short", PATCHY)
     assert replace(short, stopping=None) == training_settings("ours", PATCHY) != short
-    with pytest.raises(InvalidParameterError, match="ours_short, ours_near, subgoals, sac, abstr"):
+    with pytest.raises(InvalidParameterError, match="ours_short, ours_near, ours_chains, subg"):
         training_settings("slow", PATCHY)
 
 

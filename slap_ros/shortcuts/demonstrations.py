@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Demonstrations of a shortcut: the skills that it replaces, executed and made shorter.
+
+Nobody writes or records them. Skills lead from the shortcut's start to its target, and
+:mod:`slap_ros.shortcuts.straightening` makes their execution shorter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice, permutations, product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidParameterError, SlapError
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.problem import Problem
+from slap_ros.relational import State
+from slap_ros.shortcuts.observation_encoder import (
+    ObservationEncoder,
+    ObservationLayout,
+    observation_layout,
+)
+from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.starts import StartRecord, restore_starts, shortest_paths
+from slap_ros.shortcuts.straightening import ChainExecutor, Straightener
+
+MOST_ORDERS = 24  # of the objects in an observation that are learned from
+MOST_WAYS = 4  # ways from a start to its target that are executed until one gets there
+
+
+@dataclass(frozen=True)
+class ShortcutDemonstration:
+    """A demonstration as it is written to files and sent to other processes.
+
+    Args:
+        start: Start of the shortcut in which it begins.
+        actions: Actions of the policy, from -1 to 1, one tuple per step.
+        replaced: Environment steps of the skills before their execution was made shorter.
+        environment_steps: Environment steps that it took to find.
+    """
+
+    start: StartRecord
+    actions: tuple[tuple[float, ...], ...]
+    replaced: int
+    environment_steps: int
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        return {
+            "start": self.start.as_json(),
+            "actions": [list(action) for action in self.actions],
+            "replaced": self.replaced,
+            "environment_steps": self.environment_steps,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> ShortcutDemonstration:
+        """The demonstration of :meth:`as_json`.
+
+        Raises:
+            KeyError, TypeError, ValueError: The data is no demonstration.
+        """
+        actions = tuple(tuple(float(value) for value in action) for action in data["actions"])
+        if not actions or len({len(action) for action in actions}) > 1:
+            raise ValueError("its actions are not all of one size")
+        start = StartRecord.from_json(data["start"])
+        return cls(start, actions, int(data["replaced"]), int(data["environment_steps"]))
+
+
+class Demonstrated(NamedTuple):
+    """What a policy learns from: steps of all demonstrations.
+
+    Attributes:
+        observations: Shape (n, size).
+        actions: Shape (n, actions), from -1 to 1.
+        shortest: Environment steps of the shortest demonstration.
+    """
+
+    observations: NDArray[np.float32]
+    actions: NDArray[np.float32]
+    shortest: int
+
+
+def demonstrate(
+    domain: Domain,
+    record: StartRecord,
+    signature: Signature,
+    tries: int,
+    rng: np.random.Generator,
+) -> ShortcutDemonstration | None:
+    """Execute the skills from a start to its target, and make the execution shorter.
+
+    Args:
+        domain: Domain with the skills.
+        record: Start of the shortcut.
+        signature: Signature of the shortcut.
+        tries: Number of stretches that are tried.
+        rng: Generator that draws the stretches.
+
+    Returns:
+        The demonstration; None where skills do not lead to the target, or with actions that the
+        shortcut has not.
+    """
+    (start,) = restore_starts(domain, [record])
+    problem = Problem.of(domain, start.state)
+    try:
+        graph = build_abstract_graph(
+            start.space.abstract(start.state), start.target, problem.operators
+        )
+    except SlapError:  # no operators lead there
+        return None
+    executor = ChainExecutor(domain, problem.model.space, start.state)
+    encoder = ObservationEncoder(domain, start.space, signature, start.change)
+    straightener = Straightener(domain, encoder, start.state)
+    for way in _ways(graph):
+        commands = executor.commands(start.state, way, graph.nodes)
+        found = None if commands is None else straightener.shorten(commands, tries, rng)
+        if commands is not None and found is not None:
+            actions = tuple(tuple(row) for row in found.actions.tolist())
+            steps = executor.steps + straightener.steps
+            return ShortcutDemonstration(record, actions, len(commands), steps)
+    return None
+
+
+def _ways(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
+    """Ways to the target, those with the fewest edges first."""
+    goals = set(graph.goal_nodes)
+    to_goal = (path for path in shortest_paths(graph) if path and path[-1].target in goals)
+    return islice(to_goal, MOST_WAYS)
+
+
+def demonstrated(
+    domain: Domain, signature: Signature, demonstrations: Sequence[ShortcutDemonstration]
+) -> Demonstrated:
+    """Make demonstrations again in the model, to see what a policy observes in them.
+
+    Args:
+        domain: Domain of the demonstrations.
+        signature: Signature of the shortcut.
+        demonstrations: Demonstrations of the shortcut, one at least.
+
+    Returns:
+        The steps of those that end in the target again, once for each order of the objects of a
+        kind: which of them comes first is a matter of their names.
+
+    Raises:
+        InvalidParameterError: None does: they were made in another physics.
+    """
+    observations, actions = [], []
+    starts = restore_starts(domain, [shown.start for shown in demonstrations])
+    for start, shown in zip(starts, demonstrations, strict=True):
+        encoder = ObservationEncoder(domain, start.space, signature, start.change)
+        whole = np.array(shown.actions)
+        again = Straightener(domain, encoder, start.state).execute(whole)
+        if again is None:
+            continue
+        seen = State.batch(again.states[:-1])
+        observations.append(encoder.encode(seen).observations)
+        actions.append(again.actions)
+    if not actions:
+        raise InvalidParameterError(
+            f"no demonstration of {signature.name} ends in its target again; remove the work "
+            "folder to make others"
+        )
+    layout = observation_layout(domain, signature, starts[0].state)
+    assert layout is not None  # the task has the shortcut's objects
+    orders = list(slot_orders(layout))
+    seen_once = np.concatenate(observations)
+    return Demonstrated(
+        np.concatenate([seen_once[:, order] for order in orders]),
+        np.tile(np.concatenate(actions).astype(np.float32), (len(orders), 1)),
+        min(len(shown.actions) for shown in demonstrations),
+    )
+
+
+def slot_orders(layout: ObservationLayout) -> Iterator[NDArray[np.intp]]:
+    """Yield the columns of an observation in which the objects of a kind have other slots.
+
+    Args:
+        layout: Layout of the observation.
+
+    Yields:
+        Shape (size,); the first order is that of the observation, and there are no more than
+        ``MOST_ORDERS``.
+    """
+    begin, kinds = layout.robot, []
+    for kind, count in layout.slots.items():
+        slots = np.arange(begin, begin + count * layout.widths[kind]).reshape(count, -1)
+        kinds.append([slots[list(order)].ravel() for order in permutations(range(count))])
+        begin += slots.size
+    robot = np.arange(layout.robot)
+    for orders in islice(product(*kinds), MOST_ORDERS):
+        yield np.concatenate([robot, *orders])

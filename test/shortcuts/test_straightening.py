@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Executions of skills that are made shorter, and shortcuts that are cloned from them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import SequentialWorkers, local_workers
+from slap_ros.planning.abstract_graph import build_abstract_graph
+from slap_ros.planning.problem import Problem
+from slap_ros.policies.action_map import ActionMap
+from slap_ros.shortcuts.demonstrations import ShortcutDemonstration, demonstrate, demonstrated
+from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.settings import CHAINS, ExplorationSettings, training_settings
+from slap_ros.shortcuts.starts import find_start
+from slap_ros.shortcuts.straightened_chains import StraightenedChains
+from slap_ros.shortcuts.straightening import STRAIGHTENED, straight
+from slap_ros.shortcuts.training import Training
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
+
+SEED, TASK = 1_000_000, 10_000  # of a task for training
+FEW = ExplorationSettings(tasks=1, rollouts=1, length=1, nodes=3, straightened=20)
+
+
+@pytest.fixture(scope="module")
+def pegs():
+    return open_domain(DomainChoice("peg_in_hole", "fair", "models/skills/peg_in_hole"))
+
+
+@pytest.fixture(scope="module")
+def candidate(pegs):
+    explorer = Explorer.of_task(pegs, SEED, 0, FEW, np.random.default_rng(0))
+    found, *_ = explorer.explore().candidates
+    return found
+
+
+@pytest.fixture(scope="module")
+def start(pegs, candidate):
+    return find_start(
+        pegs, SEED, TASK, candidate.signature, candidate.operator_path, {"Pick": 25, "Insert": 30}
+    )
+
+
+def test_a_straight_motion_gets_as_far_at_full_speed():
+    out_and_back = np.array([[0.9, 0.0, -1.0]] * 4 + [[-0.4, 0.5, 1.0]] * 4)
+    motion = straight(out_and_back, axes=[0, 1])
+    assert motion.shape == (2, 3)
+    assert motion[:, :2].sum(axis=0) == pytest.approx([2.0, 2.0])
+    assert np.abs(motion).max() <= 1.0
+    assert motion[:, 2].tolist() == [-1.0, 1.0]  # the gripper closes on the way, as it did
+    assert straight(motion, axes=[0, 1]) is None  # nothing is faster
+
+
+def test_actions_are_found_again_from_the_robots(pegs):
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 5))
+    to_robot = ActionMap(pegs, gripper=True)
+    assert to_robot.inverse(to_robot(actions)) == pytest.approx(actions)
+
+
+def test_what_takes_two_contacts_is_found_where_two_skills_show_it(candidate):
+    assert candidate.found_by == (STRAIGHTENED,)
+    added = {predicate for predicate, _ in candidate.signature.add}
+    assert added == {"In", "Holding"}  # one peg is in its hole, and the other one in the hand
+    assert candidate.steps > 0
+    assert 0 < candidate.expected_saving < candidate.plan_steps
+
+
+def test_without_rounds_nothing_is_straightened(pegs):
+    none = replace(FEW, straightened=0)
+    explorer = Explorer.of_task(pegs, SEED, 0, none, np.random.default_rng(0))
+    assert not explorer.explore().candidates
+    assert "straightened" not in none.as_json()
+
+
+def test_a_budget_is_kept(pegs):
+    explorer = Explorer.of_task(pegs, SEED, 0, replace(FEW, budget=1_000), np.random.default_rng(0))
+    result = explorer.explore()
+    assert not result.candidates
+    assert result.environment_steps <= 1_000
+
+
+def test_a_demonstration_is_shorter_than_the_skills_and_ends_in_the_target(pegs, candidate, start):
+    def show():
+        return demonstrate(pegs, start, candidate.signature, 60, np.random.default_rng(1))
+
+    shown = show()
+    assert len(shown.actions) < 0.9 * shown.replaced
+    assert shown == show()
+    assert ShortcutDemonstration.from_json(shown.as_json()) == shown
+    learned_from = demonstrated(pegs, candidate.signature, [shown])  # the model made it again
+    # Both pegs could have the other one's name.
+    assert len(learned_from.observations) == len(learned_from.actions) == 2 * len(shown.actions)
+    first, second = np.split(learned_from.observations, 2)
+    assert not np.array_equal(first, second)
+    assert np.array_equal(np.sort(first, axis=1), np.sort(second, axis=1))
+    assert learned_from.shortest == len(shown.actions)
+
+
+def test_a_shortcut_without_gripper_is_not_shown_by_skills_that_need_it(pegs):
+    task = pegs.task(SEED, 0)
+    problem = Problem.of(pegs, task.initial_state)
+    space = problem.model.space
+    goal = space.mask(task.goal)
+    graph = build_abstract_graph(space.abstract(task.initial_state), goal, problem.operators)
+    chains = StraightenedChains(pegs, problem, graph)
+    pairs = list(chains.leading_from(0))  # Pick, then Insert: afterwards the hand is empty again
+    assert pairs
+    rng = np.random.default_rng(0)
+    assert all(chains.straighten(task.initial_state, 0, pair, 1, rng) is None for pair in pairs)
+
+
+class Recorder:
+    """Keeps what a training reports."""
+
+    def __init__(self, interrupt_at=None):
+        self.verdicts, self._interrupt_at = [], interrupt_at
+
+    def on_progress(self, what, done, total):
+        if (what, done) == self._interrupt_at:
+            raise KeyboardInterrupt
+
+    def on_left_out(self, use, index, reason):
+        raise AssertionError((use, index, reason))
+
+    def on_ranked(self, ranked):
+        pass
+
+    def on_learning(self, name, folder, total_steps):
+        pass
+
+    def on_validated(self, name, before, after, kept):
+        self.verdicts.append((name, before, after, kept))
+
+
+def train(folder, workers=None, callback=None):
+    """A library of shortcuts that put a block down for another one, cloned from few starts."""
+    base = training_settings(CHAINS, get_domain("obstacle2d"))
+    settings = replace(
+        base,
+        exploration=replace(FEW, tasks=3, nodes=4, straightened=20),
+        cloning=replace(base.cloning, straightened=20, epochs=200, total_steps=1_600),
+        starts=40,
+        validation=6,
+        shortcuts=1,
+        least_saving=0.01,
+    )
+    distribution = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)
+    callback = callback or Recorder()
+    workers = workers or SequentialWorkers()
+    return Training(distribution, settings, folder, workers, callback).run(), callback
+
+
+@pytest.mark.training
+def test_a_shortcut_is_cloned_and_shortens_plans_and_any_processes_learn_the_same(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        train(tmp_path / "here", callback=Recorder(interrupt_at=("straightening skills", 5)))
+    library, callback = train(tmp_path / "here")  # goes on
+    ((_, before, after, kept),) = callback.verdicts
+    assert kept and after < before
+    (shortcut,) = library.shortcuts
+    assert shortcut.record["found_by"] == [STRAIGHTENED]
+    assert shortcut.record["success"] > 0.0  # of episodes with noise, without a choice of the best
+    shown = shortcut.record["demonstrations"]
+    assert 20 <= shown["number"] <= 40
+    assert shown["straightened"] < shown["skills"]
+    assert shown["environment_steps"] < shortcut.record["environment_steps"]
+    with local_workers(2) as workers:
+        other, _ = train(tmp_path / "there", workers=workers)
+    assert other.digest == library.digest
+
+
+def test_one_policy_for_several_shortcuts_cannot_be_cloned():
+    from slap_ros.shortcuts.stage_learner import make_learner
+
+    cloning = training_settings(CHAINS, get_domain("obstacle2d")).cloning
+    with pytest.raises(InvalidParameterError, match="leave `together` at 1"):
+        make_learner(None, None, cloning, 0)
