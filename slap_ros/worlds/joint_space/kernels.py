@@ -264,12 +264,8 @@ def hits(start: Array, end: Array, links: LinkBoxes, obstacles: BoxRows) -> bool
             if _is_near(box, half, centre, reach):
                 spacing = max(2.0 * min(half), SAMPLING)
                 samples = max(math.ceil(travel / spacing), 1)
-                core = (
-                    max(half[0] - depth, 0.0),
-                    max(half[1] - depth, 0.0),
-                    max(half[2] - depth, 0.0),
-                )
-                if _enters(start[i], end[i], samples, (box, core), (frame, own)):
+                core = box, _shrunk(half, depth)
+                if _enters(start[i], end[i], samples, core, (frame, own)):
                     return True
     return False
 
