@@ -8,6 +8,8 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from typing import Any, TypeVar
 
@@ -34,6 +36,16 @@ class JobRunner:
     log: StudyLog
     processes: int
     progress: StudyProgress
+
+    def checkpoints(self, output: Path, study: str) -> Path:
+        """Folder for the checkpoints of this command alone: those of others are of other trainings.
+
+        Args:
+            output: Folder that the report is written to.
+            study: Name of the study and its domain.
+        """
+        digest = sha256(self.log.origin.command.encode()).hexdigest()[:8]
+        return output / f".{study}-{digest}"
 
     def run(
         self,

@@ -7,7 +7,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +32,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.learning_curves import (
     AcquisitionSetup,
     LearningCurves,
+    format_steps_to,
     learn_skills,
 )
 from slap_ros.studies.options import RESULTS, Output
@@ -212,10 +212,7 @@ def study(
 def _row(result: PartResult) -> Iterator[str]:
     yield result.without
     yield format_spread(Spread.of(result.progress), 2)
-    steps = format_spread(Spread.of([float(steps) for steps, _ in result.steps_to_level]), 0)
-    came = sum(reached for _, reached in result.steps_to_level)
-    total = len(result.trainings)
-    yield steps if came == total else f"≥ {steps} ({came} of {total} came there)"
+    yield format_steps_to([training.curves[PLAN] for training in result.trainings], LEVEL)
     yield format_spread(Spread.of([float(steps) for steps in result.steps]), 0)
 
 
@@ -286,9 +283,7 @@ def prepare(options: AcquisitionAblationOptions, _: Tell) -> PreparedStudy:
     setup = AcquisitionSetup(domain.name, domain.preset, request.goal_or_first, settings)
 
     def make(runner: JobRunner) -> StudyReport:
-        # Checkpoints of another command would be of other trainings.
-        digest = sha256(runner.log.origin.command.encode()).hexdigest()[:8]
-        folder = options.output / f".acquisition_ablation_{domain.name}-{digest}"
+        folder = runner.checkpoints(options.output, f"acquisition_ablation_{domain.name}")
         report = study(setup, parts, options.seeds, runner, folder)
         shutil.rmtree(folder, ignore_errors=True)  # the log has every result
         return report

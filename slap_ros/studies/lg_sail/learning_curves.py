@@ -15,8 +15,10 @@ from slap_ros.acquisition.curriculum.solved_shares import Point
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.api.acquisition import UnwatchedCurriculum, acquirable, known_skills
-from slap_ros.api.learning_curves import CurveCallback
+from slap_ros.api.learning_curves import CurveCallback, steps_to
+from slap_ros.evaluation.summary import Spread
 from slap_ros.learning.workers import SequentialWorkers
+from slap_ros.studies.comparison import format_spread
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,19 @@ class LearningCurves:
         }
         begun = {str(name): dict(one) for name, one in data["began_with"].items()}
         return cls(curves, begun, str(data["ended"]), float(data["progress"]))
+
+
+def format_steps_to(trainings: Sequence[Sequence[Point]], level: float) -> str:
+    """After how many environment steps a level was first measured, over trainings, in words.
+
+    Args:
+        trainings: Measurements of each training, by one measure.
+        level: Success from which on the level is reached.
+    """
+    found = [steps_to(one, level) for one in trainings]
+    reached = sum(done for _, done in found)
+    spread = format_spread(Spread.of([float(steps) for steps, _ in found]), 0)
+    return spread if reached == len(found) else f"≥ {spread} ({reached} of {len(found)} came there)"
 
 
 def learn_skills(

@@ -7,7 +7,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from hashlib import sha256
 from itertools import chain
 from pathlib import Path
 from statistics import fmean
@@ -30,6 +29,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.learning_curves import (
     AcquisitionSetup,
     LearningCurves,
+    format_steps_to,
     learn_skills,
 )
 from slap_ros.studies.options import RESULTS, Output
@@ -192,20 +192,13 @@ def _row(comparison: StartComparison, warm: Sequence[LearningCurves]) -> list[st
     ratio = comparison.ratio
     return [
         comparison.name,
-        _steps(comparison.scratch),
-        _steps(comparison.warm),
+        format_steps_to(comparison.scratch, LEVEL),
+        format_steps_to(comparison.warm, LEVEL),
         "-" if ratio is None else f"{'≤ ' if comparison.is_bound else ''}{_ratio(*ratio)}",
         _last(comparison.scratch),
         _last(comparison.warm),
         _begun_with([one.began_with.get(comparison.name, {}) for one in warm]),
     ]
-
-
-def _steps(trainings: Sequence[Sequence[Point]]) -> str:
-    found = [steps_to(one, LEVEL) for one in trainings]
-    reached = sum(done for _, done in found)
-    spread = format_spread(Spread.of([float(steps) for steps, _ in found]), 0)
-    return spread if reached == len(found) else f"≥ {spread} ({reached} of {len(found)} came there)"
 
 
 def _last(trainings: Sequence[Sequence[Point]]) -> str:
@@ -324,9 +317,7 @@ def prepare(options: WarmStartOptions, tell: Tell) -> PreparedStudy:
     }
 
     def make(runner: JobRunner) -> StudyReport:
-        # Checkpoints of another command would be of other trainings.
-        digest = sha256(runner.log.origin.command.encode()).hexdigest()[:8]
-        folder = options.output / f".warm_start_{domain.name}-{digest}"
+        folder = runner.checkpoints(options.output, f"warm_start_{domain.name}")
         report = study(setup, libraries, options.seeds, segment_steps, runner, folder)
         shutil.rmtree(folder, ignore_errors=True)  # the log has every result
         return report

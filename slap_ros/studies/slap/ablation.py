@@ -10,7 +10,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
@@ -410,9 +409,7 @@ def prepare(options: AblationOptions, _: Tell) -> PreparedStudy:
     }
 
     def make(runner: JobRunner) -> StudyReport:
-        # Checkpoints of another command would be of other trainings.
-        digest = sha256(runner.log.origin.command.encode()).hexdigest()[:8]
-        folder = options.output / f".ablation_{domain}-{digest}"
+        folder = runner.checkpoints(options.output, f"ablation_{domain}")
         report = study(setup, options.term or setup.terms(), trainings, runner, folder)
         shutil.rmtree(folder, ignore_errors=True)  # the log has every result
         return report
