@@ -17,12 +17,10 @@ from slap_ros.domains.benchtop.approach import acted_on
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, HandGoal
 from slap_ros.domains.benchtop.scripts import (
     CLEARANCE,
-    FIRM_STEPS,
     GENTLE,
-    GRIP_STEPS,
     Move,
+    close_around,
     follow,
-    hold_still,
     over,
     release,
 )
@@ -49,8 +47,7 @@ def grasp(state: State, parameters: Array) -> Policy:
         release(),
         *over(state, goal, OPEN),
         Move(goal, OPEN),
-        hold_still(CLOSE, _holds_something, GRIP_STEPS),
-        hold_still(CLOSE, _never, FIRM_STEPS),
+        *close_around(lambda now: held_thing(now) is not None),
         Move(goal.raised(CLEARANCE), CLOSE, patience=RISE_STEPS),
     )
 
@@ -88,14 +85,6 @@ def open_fingers(state: State, parameters: Array) -> Policy:
 def _goal(parameters: Array) -> HandGoal:
     x, y, z, yaw = map(float, parameters[:4])
     return HandGoal((x, y, z), yaw)
-
-
-def _holds_something(state: State) -> bool:
-    return held_thing(state) is not None
-
-
-def _never(_: State) -> bool:
-    return False
 
 
 def _target(state: State, objects: tuple[Object, ...]) -> Vector:

@@ -135,10 +135,16 @@ def hold_still(gripper: float, until: Condition, patience: int = GRIP_STEPS) -> 
 
 def grasp(thing: Object) -> tuple[Move, Move]:
     """The moves that close the fingers around a thing and let them press for a moment."""
-    return (
-        hold_still(CLOSE, lambda state: value(state, thing, "held") > 0.5),
-        hold_still(CLOSE, _never, patience=FIRM_STEPS),
-    )
+    return close_around(lambda state: value(state, thing, "held") > 0.5)
+
+
+def close_around(is_held: Condition) -> tuple[Move, Move]:
+    """The moves that close the fingers until something is held, and let them press for a moment.
+
+    Args:
+        is_held: Condition that says whether it is.
+    """
+    return hold_still(CLOSE, is_held), hold_still(CLOSE, _never, patience=FIRM_STEPS)
 
 
 def release() -> Move:
