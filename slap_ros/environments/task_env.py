@@ -202,9 +202,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         Raises:
             InvalidParameterError: Actions run no skills, or no episode has begun.
         """
-        if not isinstance(self._control, (SkillControl, MixedControl)):
+        if self._skills is None:
             raise InvalidParameterError("joints and primitives run no skills, so there is no mask")
-        return self._control.mask(self._under_way)
+        return self._skills.mask(self._under_way)
 
     # -- making it --------------------------------------------------------------------------------
 
@@ -234,7 +234,13 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     @property
     def _needs_same_objects(self) -> bool:
         """Whether goals or actions are numbered over the objects of the first task."""
-        return isinstance(self._control, (SkillControl, MixedControl))
+        return self._skills is not None
+
+    @property
+    def _skills(self) -> SkillControl | MixedControl | None:
+        """The control, where actions run skills."""
+        control = self._control
+        return control if isinstance(control, (SkillControl, MixedControl)) else None
 
     # -- an episode -------------------------------------------------------------------------------
 
@@ -332,8 +338,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         }
         if isinstance(self._reward, StagedReward):
             info["progress"] = 1.0 if solved else self._reward.progress
-        if isinstance(self._control, (SkillControl, MixedControl)):
-            info["action_mask"] = self._control.mask(episode)
+        if self._skills is not None:
+            info["action_mask"] = self._skills.mask(episode)
         return info
 
 

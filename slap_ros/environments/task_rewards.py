@@ -14,7 +14,7 @@ from slap_ros.planning.plan import PlanEdge
 from slap_ros.planning.problem import ground_options
 from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.policies.learner_interface import learner_interface
-from slap_ros.relational import Column, LiftedOperator, Object, RewardTemplate, State
+from slap_ros.relational import LiftedOperator, Object, RewardTemplate, State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.signature import Change, Signature
@@ -97,18 +97,12 @@ class MetricReward:
             objects: Objects that it is applied to.
             template: Dense part of the operator's reward.
         """
-        own = dict(zip(operator.parameters, objects, strict=True))
-        self._terms = [
-            (term, [Column((own[variable],)) for variable in term.arguments])
-            for term in template.terms
-        ]
+        self._objects = dict(zip(operator.parameters, objects, strict=True))
+        self._terms = template.terms
         self._before = self._value(state)
 
     def _value(self, state: State) -> float:
-        return sum(
-            term.weight * float(term.metric.normalised(state, *columns).reshape(-1)[0])
-            for term, columns in self._terms
-        )
+        return sum(term.weight * term.value(state, self._objects) for term in self._terms)
 
     def of(self, state: State, reached: bool) -> float:
         """See :meth:`PotentialReward.of`."""
@@ -189,9 +183,10 @@ def _dense_reward(episode: TaskEpisode, edge: PlanEdge) -> PotentialReward | Met
     """What is paid on the way to the end of a plan's first edge, from the newest state."""
     name, objects = edge.option.skill.name, edge.option.objects
     written = episode.domain.acquisition
-    for operator in written.operators if written else ():
-        if written and operator.name == name and _fits(operator, objects):
-            return MetricReward(episode.state, operator, objects, written.rewards[name])
+    if written is not None:
+        for operator in written.operators:
+            if operator.name == name and _fits(operator, objects):
+                return MetricReward(episode.state, operator, objects, written.rewards[name])
     change = Change.between(episode.abstract, edge.target.required)
     return PotentialReward(episode, change)
 

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from slap_ros.relational.metrics import Metric
+from slap_ros.relational.objects import Column, Object
 from slap_ros.relational.operators import Variable
+from slap_ros.relational.state import State
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,16 @@ class RewardTerm:
     metric: Metric
     arguments: tuple[Variable, ...]  # one per type of the metric
     weight: float  # in [0, 1]
+
+    def value(self, state: State, objects: Mapping[Variable, Object]) -> float:
+        """The normalised metric in a single state, not weighted.
+
+        Args:
+            state: A single state.
+            objects: Object of each of the operator's parameters.
+        """
+        columns = [Column((objects[variable],)) for variable in self.arguments]
+        return float(self.metric.normalised(state, *columns)[0])
 
     def __str__(self) -> str:
         names = ", ".join(variable.name for variable in self.arguments)

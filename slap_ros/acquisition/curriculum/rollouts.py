@@ -18,7 +18,6 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.astar import find_shortest_sequence
 from slap_ros.relational import (
     AtomSpace,
-    Column,
     GroundOperator,
     LiftedOperator,
     RewardTemplate,
@@ -259,12 +258,10 @@ def _carry_out(
 def _metrics(template: RewardTemplate, operator: GroundOperator, state: State) -> dict[str, float]:
     """The normalised metrics of a reward in a state, by their text."""
     objects = dict(zip(operator.operator.parameters, operator.objects, strict=True))
-    values = {}
-    for term in template.terms:
-        columns = [Column((objects[variable],)) for variable in term.arguments]
-        value = term.metric.normalised(state, *columns)
-        values[f"{term.metric}({', '.join(v.name for v in term.arguments)})"] = float(value[0])
-    return values
+    return {
+        f"{term.metric}({', '.join(v.name for v in term.arguments)})": term.value(state, objects)
+        for term in template.terms
+    }
 
 
 def _approach(domain: Domain, world: World, operator: GroundOperator) -> bool:
