@@ -18,6 +18,7 @@ class RunStatistics:
 
     first_step: int
     plans: int = 0
+    improved: int = 0  # plans that are a shorter rest of the one before
     planning_ns: int = 0
     edges_rolled_out: int = 0
     first: PlanningResult | None = None  # first plan that was made
@@ -33,12 +34,23 @@ class RunStatistics:
         self.edges_rolled_out += planned.edges_rolled_out
         self.first = self.first or planned
 
+    @property
+    def replans(self) -> int:
+        """Number of plans that replaced one that diverged."""
+        return max(self.plans - self.improved - 1, 0)
+
+    def improve(self, shorter: PlanningResult) -> None:
+        """Add a plan that is a shorter rest of the one before."""
+        self.plans += 1
+        self.improved += 1
+        self.edges_rolled_out += shorter.edges_rolled_out
+
     def result(self, last_step: int, outcome: OptionResult) -> SolveTask.Result:
         """The action's result."""
         return SolveTask.Result(
             success=outcome.reached,
             plan_length=last_step - self.first_step,
-            replans=max(self.plans - 1, 0),
+            replans=self.replans,
             planning_seconds=self.planning_ns / 1e9,
             edges_rolled_out=self.edges_rolled_out,
             bound=(self.first.bound if self.first is not None else None) or 0.0,

@@ -38,8 +38,8 @@ from slap_ros.errors import (
 )
 from slap_ros.planning.execution import DIVERGENCES, FINAL, UNPLANNED
 from slap_ros.planning.options import OptionResult, hold_option
-from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
-from slap_ros.planning.planner import Planner
+from slap_ros.planning.plan import PlanEdge, PlanningResult
+from slap_ros.planning.planner import ImprovingPlanner, Planner
 
 ANSWER_TIMEOUT = 5.0  # s, for the skill server to accept a goal, or to end one that is canceled
 ASK_AGAIN = 2.0  # s without a result after which it is asked for again
@@ -104,7 +104,7 @@ class TaskExecution:
             misperceived = unplanned and outcome.code not in FINAL and self._may_look_different
             if not misperceived and outcome.code not in DIVERGENCES:
                 break
-            if self._statistics.plans > self.goal.request.max_replans:
+            if self._statistics.replans >= self.goal.request.max_replans:
                 limit = f"diverged again after {self.goal.request.max_replans} replans"
                 outcome = OptionResult(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {outcome.reason}")
                 break
@@ -122,23 +122,50 @@ class TaskExecution:
     async def _plan_and_execute(self) -> tuple[OptionResult, bool]:
         """Make one plan and execute it; second, whether there was no plan."""
         try:
-            plan = await self._plan()
+            planned = await self._plan()
         except UNPLANNED as error:
             return OptionResult(error.code, str(error)), True
-        return await self._execute_plan(plan), False
+        return await self._execute_plan(planned), False
 
-    async def _execute_plan(self, plan: Plan) -> OptionResult:
-        """Execute a plan, up to its first edge that fails."""
-        for number, edge in enumerate(plan.edges):
+    async def _execute_plan(self, planned: PlanningResult) -> OptionResult:
+        """Execute a plan, up to its first edge that fails; its rest may get shorter meanwhile."""
+        number = 0
+        while number < len(planned.plan.edges):
             self._event(PlanEvent.EDGE_STARTED, edge=number)
-            outcome = await self._execute(edge)
+            improving = self._begin_to_improve(planned, number)
+            outcome = await self._execute(planned.plan.edges[number])
             if not outcome.reached:
                 if outcome.code in DIVERGENCES:
                     code, reason = int(outcome.code), outcome.reason
                     self._event(PlanEvent.DIVERGED, edge=number, error_code=code, error_msg=reason)
                 return outcome
             self._event(PlanEvent.EDGE_REACHED, edge=number)
+            number += 1
+            if improving is not None and (shorter := await self._improved(improving)) is not None:
+                planned, number = shorter, 0
         return OptionResult(ErrorCode.NONE)
+
+    def _begin_to_improve(self, planned: PlanningResult, number: int) -> Future | None:
+        """Look for a shorter rest of a plan, in the worker, while one of its edges is executed."""
+        planner, start = self.planner, self._latest
+        if planned.is_proven or not isinstance(planner, ImprovingPlanner):
+            return None
+
+        def improve_rest() -> PlanningResult | None:
+            state = start.episode.domain.to_plan_from(start.state)
+            return planner.improve_rest(planned, number, state, self.goal_mask)
+
+        return submit(self.workers, improve_rest)
+
+    async def _improved(self, improving: Future) -> PlanningResult | None:
+        """Wait for what comes of it, and announce it as the plan; None where nothing does."""
+        await self._wait(improving)
+        shorter: PlanningResult | None = improving.result().result()
+        if shorter is not None:
+            self._statistics.improve(shorter)
+            self._event(PlanEvent.IMPROVED, edges_rolled_out=shorter.edges_rolled_out)
+            self._publish(shorter)
+        return shorter
 
     @property
     def _may_look_different(self) -> bool:
@@ -156,8 +183,8 @@ class TaskExecution:
 
     # -- planning -------------------------------------------------------------------------------
 
-    async def _plan(self) -> Plan:
-        state, number = self._latest.state, self._statistics.plans
+    async def _plan(self) -> PlanningResult:
+        state = self._latest.state
         domain = self._latest.episode.domain
         self._statistics.plans += 1
         self._feedback(SolveTask.Feedback.PLANNING)
@@ -171,13 +198,18 @@ class TaskExecution:
             self.node.get_logger().warning(f"the plan fails in the model: {result.fails}")
         done = self._event(PlanEvent.PLANNED, edges_rolled_out=result.edges_rolled_out)
         self._statistics.add(result, done - started)
-        self.publisher.plan(result, self.goal_mask, number, self._latest, self.provenance)
+        self._publish(result)
         self._feedback(
             SolveTask.Feedback.EXECUTING,
             graph_nodes=result.graph_nodes,
             graph_edges=result.graph_edges,
         )
-        return result.plan
+        return result
+
+    def _publish(self, planned: PlanningResult) -> None:
+        """Publish the newest plan."""
+        number = self._statistics.plans - 1
+        self.publisher.plan(planned, self.goal_mask, number, self._latest, self.provenance)
 
     # -- execution ------------------------------------------------------------------------------
 

@@ -28,6 +28,8 @@ class EventPrinter:
             self._skill(message)
         elif type_name == PLAN_EVENT and message.kind == PlanEventKind.DIVERGED:
             console.print(styled("diverged", "yellow", f": {message.error_msg}"))
+        elif type_name == PLAN_EVENT and message.kind == PlanEventKind.IMPROVED:
+            console.print(styled("improved", "green", ": a shorter rest of the plan was found"))
         elif type_name == PLAN_EVENT and message.kind == PlanEventKind.FAILED:
             console.print(styled("failed", "red", f": {message.error_msg}"))
         elif type_name == ACQUISITION_EVENT:

@@ -35,6 +35,7 @@ TO_COME = ("·", "dim")
 PHASES = {
     PlanEventKind.PLANNING_STARTED: "planning",
     PlanEventKind.PLANNED: "planned",
+    PlanEventKind.IMPROVED: "improved",
     PlanEventKind.EDGE_STARTED: "executing",
     PlanEventKind.EDGE_REACHED: "executing",
     PlanEventKind.DIVERGED: "diverged",

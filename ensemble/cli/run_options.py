@@ -25,6 +25,7 @@ from slap_ros.cli.options import (
     Goal,
     Index,
     Json,
+    NoImprove,
     Planner,
     Within,
     at_most,
@@ -62,6 +63,7 @@ class RunOptions:
     planner: Planner = DEFAULT_PLANNER
     within: Within = None
     effort: EffortFactor = None
+    no_improve: NoImprove = False
     skills: Skills = SHIPPED
     max_replans: Annotated[
         int,
@@ -196,7 +198,8 @@ class RunOptions:
     @property
     def planner_choice(self) -> str:
         """The planner with its settings."""
-        return with_settings(self.planner, self.within, self.effort)
+        improve = 0 if self.no_improve else None
+        return with_settings(self.planner, self.within, self.effort, improve)
 
     def __post_init__(self) -> None:
         """Refuse what can be refused without the domain; see the class."""

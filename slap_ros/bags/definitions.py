@@ -24,7 +24,7 @@ from rosbags.typesys.store import Typestore
 
 from slap_ros.bags.raw import Channel, MessageDefinition, one_line
 from slap_ros.errors import DamagedBagError, ForeignBagError
-from slap_ros.messages.interfaces import PACKAGE, PLAN
+from slap_ros.messages.interfaces import PACKAGE, PLAN, PLAN_EVENT
 from slap_ros.messages.typestore import definition, message_texts, typestore
 
 IDL_SEPARATOR = "=" * 80 + "\n"
@@ -39,6 +39,7 @@ FIELDS_PER_DEFINITION = 10  # each of which takes as long as so many fields
 # been empty, so that being without them means the same.
 ADDED = {
     PLAN: ("bound",),
+    PLAN_EVENT: ("IMPROVED",),
     "slap_msgs/msg/PlanEdge": ("others_may_appear", "forbidden_atoms"),
     "slap_msgs/msg/AcquisitionEvent": (
         *("ROLLED_OUT", "JUDGED", "ACQUIRED", "operators", "iteration", "task", "progress"),

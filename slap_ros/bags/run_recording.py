@@ -111,17 +111,20 @@ class _RunRecording:
 
     def _write_execution(self, execution: PlanExecution) -> None:
         """A plan, and what was executed of it."""
-        self._plan_event(PlanEventKind.PLANNING_STARTED)
-        self.now_ns += round(execution.seconds * NANOSECONDS)
+        announcing = PlanEventKind.IMPROVED
+        if not execution.improves:
+            announcing = PlanEventKind.PLANNED
+            self._plan_event(PlanEventKind.PLANNING_STARTED)
+            self.now_ns += round(execution.seconds * NANOSECONDS)
         if execution.planned is None:
             return
-        self._write_plan(execution.planned)
+        self._write_plan(execution.planned, announcing)
         edges = zip(execution.outcomes, execution.steps, strict=True)
         for number, (outcome, steps) in enumerate(edges):
             self._write_edge(execution.planned, number, outcome, steps)
 
-    def _write_plan(self, planned: PlanningResult) -> None:
-        self._plan_event(PlanEventKind.PLANNED, edges_rolled_out=planned.edges_rolled_out)
+    def _write_plan(self, planned: PlanningResult, announcing: PlanEventKind) -> None:
+        self._plan_event(announcing, edges_rolled_out=planned.edges_rolled_out)
         goal = self._space.mask(self.task.goal)
         at = EPISODE, self._number, self._stamp
         made = asdict(planned.origin)

@@ -22,7 +22,7 @@ from slap_ros.api.evaluation import (
 from slap_ros.api.library_descriptions import both_in_words, describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
+from slap_ros.cli.options import EffortFactor, Goal, Json, NoImprove, Planner, Within, at_most
 from slap_ros.cli.rivals import Against, RivalResults, run_rivals
 from slap_ros.cli.shortcuts import choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
@@ -72,6 +72,7 @@ def evaluate(
     planner: Planner = DEFAULT_PLANNER,
     within: Within = None,
     effort: EffortFactor = None,
+    no_improve: NoImprove = False,
     jobs: Jobs = 1,
     output: Annotated[
         Path | None, typer.Option(help="JSON file for all trials, with settings and libraries.")
@@ -85,7 +86,7 @@ def evaluate(
     digests of skills and shortcuts are printed. Spreads are mean ± sample standard deviation over
     all tasks.
     """
-    planner = with_settings(planner, within, effort)
+    planner = with_settings(planner, within, effort, 0 if no_improve else None)
     chosen = open_chosen(domain, preset, skills)
     settings = {"preset": chosen.preset, "tasks": tasks, "seeds": seeds, "first_seed": first_seed}
     settings |= {"samples": samples, "planner": planner}

@@ -16,7 +16,7 @@ PANELS: Mapping[str, str] = {
         ("seed", "index", "preset", "goal", "tasks", "seeds", "first_seed", "presets"), TASK
     ),
     **dict.fromkeys(
-        ("shortcuts", "samples", "planner", "within", "effort", "max_replans"),
+        ("shortcuts", "samples", "planner", "within", "effort", "no_improve", "max_replans"),
         PLANNING,
     ),
     **dict.fromkeys(

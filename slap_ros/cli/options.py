@@ -76,6 +76,14 @@ EffortFactor = Annotated[
         "in roll-outs. With PDDL files: factor of all limits. Default: 1.",
     ),
 ]
+NoImprove = Annotated[
+    bool,
+    typer.Option(
+        "--no-improve",
+        help="With the planner anytime: do not look for a shorter rest of a plan while the robot "
+        "executes it.",
+    ),
+]
 Seed = Annotated[
     int,
     typer.Option(min=0, callback=at_most(MAX_SEED), help="Seed from which tasks are sampled."),

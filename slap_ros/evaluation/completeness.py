@@ -9,6 +9,7 @@ from itertools import pairwise
 
 from slap_ros.evaluation.executed_options import ExecutedOption
 from slap_ros.evaluation.recorded_run import RecordedRun
+from slap_ros.messages.events import ANNOUNCING
 from slap_ros.messages.events import PlanEventKind as Kind
 from slap_ros.messages.protocols import PlanEventMessage
 
@@ -17,7 +18,8 @@ FOLLOWERS: Mapping[int, Collection[Kind]] = {
     Kind.PLANNING_STARTED: (Kind.PLANNED, Kind.PLANNING_STARTED, Kind.FAILED),
     Kind.PLANNED: (Kind.EDGE_STARTED, Kind.SOLVED, Kind.FAILED),
     Kind.EDGE_STARTED: (Kind.EDGE_REACHED, Kind.DIVERGED, Kind.FAILED),
-    Kind.EDGE_REACHED: (Kind.EDGE_STARTED, Kind.SOLVED, Kind.FAILED),
+    Kind.EDGE_REACHED: (Kind.EDGE_STARTED, Kind.IMPROVED, Kind.SOLVED, Kind.FAILED),
+    Kind.IMPROVED: (Kind.EDGE_STARTED, Kind.FAILED),
     Kind.DIVERGED: (Kind.PLANNING_STARTED, Kind.FAILED),
 }
 
@@ -130,7 +132,8 @@ def planning_is_whole(events: Sequence[PlanEventMessage]) -> bool:
             return False
         if begins and after.plan_number not in (0, before.plan_number + 1):
             return False
-        if not begins and after.plan_number != before.plan_number:
+        improves = after.kind == Kind.IMPROVED
+        if not begins and after.plan_number != before.plan_number + improves:
             return False
     return True
 
@@ -141,10 +144,10 @@ def _may_follow(before: PlanEventMessage, after: PlanEventMessage) -> bool:
         return True
     if after.kind not in FOLLOWERS.get(before.kind, ()):
         return False
-    if after.kind == Kind.PLANNING_STARTED:
+    if after.kind in (Kind.PLANNING_STARTED, Kind.IMPROVED):
         return after.plan_number == before.plan_number + 1
     if after.kind == Kind.EDGE_STARTED:
-        return after.edge == (0 if before.kind == Kind.PLANNED else before.edge + 1)
+        return after.edge == (0 if before.kind in ANNOUNCING else before.edge + 1)
     if after.kind in (Kind.EDGE_REACHED, Kind.DIVERGED):
         return after.edge == before.edge
     return True

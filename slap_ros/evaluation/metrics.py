@@ -43,7 +43,7 @@ class RunMetrics:
     shortcut_steps: int | None  # environment steps that shortcuts took, out of plan_length
     planning_seconds: float | None  # planning time of all plans together, s
     replans: int | None
-    edges_rolled_out: int | None  # options simulated while planning
+    edges_rolled_out: int | None  # options simulated for all plans
     error_code: ErrorCode
     error_msg: str
     options: tuple[OptionMetrics, ...]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from slap_ros.evaluation.atom_names import AtomNames, atom_names
 from slap_ros.evaluation.run_events import RunEvents
-from slap_ros.messages.events import PlanEventKind
+from slap_ros.messages.events import ANNOUNCING
 from slap_ros.messages.protocols import PlanEventMessage, PlanMessage, TaskMessage
 
 
@@ -39,7 +39,8 @@ class RecordedRun:
         preset: Preset of the domain; None where it is not known.
         events: Plan events of the run.
         episode: Record of the run's episode, of which the run may be a part.
-        announced: Plan that each PLANNED event of the run announced; None where it is missing.
+        announced: Plan that each event of the run announced that announces one; None where it is
+            missing.
     """
 
     domain: str
@@ -82,7 +83,7 @@ class RecordedRun:
 def announced_plans(
     events: Iterable[PlanEventMessage], plans: Iterable[PlanMessage]
 ) -> dict[int, PlanMessage]:
-    """The plans that the PLANNED events of an episode announced, without those that are missing.
+    """The plans that the events of an episode announced, without those that are missing.
 
     By number and order, not by stamps: clocks are set back, and each run counts from 0.
 
@@ -95,7 +96,7 @@ def announced_plans(
     """
     found: dict[int, PlanMessage] = {}
     waiting = list(plans)
-    for event in (one for one in events if one.kind == PlanEventKind.PLANNED):
+    for event in (one for one in events if one.kind in ANNOUNCING):
         numbers = [plan.number for plan in waiting]
         if event.plan_number in numbers:
             position = numbers.index(event.plan_number)

@@ -13,11 +13,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from slap_ros.messages.decode import stamp_ns
-from slap_ros.messages.events import PlanEventKind
+from slap_ros.messages.events import ANNOUNCING, PlanEventKind
 from slap_ros.messages.protocols import PlanEventMessage
 
 RUN_ENDS = (PlanEventKind.SOLVED, PlanEventKind.FAILED)
 PLANNING_ENDS = (PlanEventKind.PLANNED, PlanEventKind.FAILED)
+COUNTING = (*ANNOUNCING, PlanEventKind.FAILED)  # which say how many options were simulated
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class RunEvents:
     @property
     def planned(self) -> list[PlanEventMessage]:
         """The events that announce a plan, in order."""
-        return [event for event in self.messages if event.kind == PlanEventKind.PLANNED]
+        return [event for event in self.messages if event.kind in ANNOUNCING]
 
     def planning_ns(self) -> int:
         """The planning time of all plans together, ns."""
@@ -67,8 +68,8 @@ class RunEvents:
         return Counter(event.step for event in started)
 
     def edges_rolled_out(self) -> int:
-        """The number of options that were simulated while planning."""
-        return sum(event.edges_rolled_out for event in self.messages if event.kind in PLANNING_ENDS)
+        """The number of options that were simulated for all plans."""
+        return sum(event.edges_rolled_out for event in self.messages if event.kind in COUNTING)
 
 
 def split_into_runs(events: Iterable[PlanEventMessage]) -> list[RunEvents]:

@@ -17,6 +17,10 @@ class PlanEventKind(IntEnum):
     DIVERGED = 4
     SOLVED = 5
     FAILED = 6
+    IMPROVED = 7
+
+
+ANNOUNCING = (PlanEventKind.PLANNED, PlanEventKind.IMPROVED)  # a plan, each
 
 
 class SkillEventKind(IntEnum):

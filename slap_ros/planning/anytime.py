@@ -81,7 +81,7 @@ class AnytimePlanner:
         best, before = None, self.problem.model.executed
         try:
             for best in self.improve(state, goal):
-                if best.bound is not None and best.bound <= self.effort.within:
+                if self._is_good(best):
                     break
         except KeyboardInterrupt as interrupt:
             if best is None:
@@ -106,12 +106,34 @@ class AnytimePlanner:
         """Abstract states of a graph that is searched as a whole."""
         return self.effort.tests // max(1, len(self.problem.operators))
 
-    def improve(self, state: State, goal: int) -> Iterator[PlanningResult]:
+    def improve_rest(
+        self, planned: PlanningResult, number: int, state: State, goal: int
+    ) -> PlanningResult | None:
+        """See :class:`~slap_ros.planning.planner.ImprovingPlanner`."""
+        edge, rest = planned.plan.edges[number], Plan(planned.plan.edges[number + 1 :])
+        if not (rest.edges and self.effort.improve) or self._is_good(planned):
+            return None
+        ahead = self.problem.model.roll_out(edge.option, state, edge.target)
+        if not ahead.reached:
+            return None
+        effort = replace(self.effort, rollouts=self.effort.improve * max(1, ahead.steps))
+        found: list[PlanningResult] = []
+        with suppress(UnsolvableError, PlanningLimitError):  # of another plan than the rest
+            found.extend(replace(self, effort=effort).improve(ahead.final, goal, rest))
+        return found[-1] if found and found[-1].steps < rest.predicted_steps else None
+
+    def _is_good(self, planned: PlanningResult) -> bool:
+        return planned.bound is not None and planned.bound <= self.effort.within
+
+    def improve(
+        self, state: State, goal: int, known: Plan | None = None
+    ) -> Iterator[PlanningResult]:
         """Each plan that is better than those before, or of which more is proven.
 
         Args:
             state: Low-level state to start from.
             goal: Mask of atoms that must hold.
+            known: Plan from there, in the place of a first one; None without one.
 
         Returns:
             The plans, as they are found; none where no plan through the abstract graph can be
@@ -123,7 +145,7 @@ class AnytimePlanner:
         """
         abstract = self.problem.model.space.abstract(state)
         planner = replace(self._whole, max_nodes=self._most_abstract_states)
-        run = _Improvement(self, state, goal)
+        run = _Improvement(self, state, goal, known)
         try:
             graph = planner.graph(abstract, goal)
         except PlanningLimitError:
@@ -136,13 +158,15 @@ class AnytimePlanner:
 class _Improvement:
     """One run of :meth:`AnytimePlanner.improve`."""
 
-    def __init__(self, planner: AnytimePlanner, state: State, goal: int) -> None:
+    def __init__(
+        self, planner: AnytimePlanner, state: State, goal: int, known: Plan | None
+    ) -> None:
         self._planner, self._state, self._goal = planner, state, goal
         self._simulated_before = planner.problem.model.executed
         self._model = CountedModel(planner.problem.model)
         self._problem = replace(planner.problem, model=self._model)
         self._limit = planner.effort.rollouts
-        self._best: Plan | None = None
+        self._best = known
         self._no_first: PlanningLimitError | None = None  # why FF found no plan
         self._at_least = 0  # environment steps of any plan
         shortcuts = planner.shortcuts
@@ -158,7 +182,7 @@ class _Improvement:
             add_shortcuts: Function that adds shortcuts to it, which takes longer than a first plan.
         """
         is_small = len(graph.nodes) <= SMALL
-        if not is_small:
+        if not (is_small or self._best):
             with suppress(PlanningLimitError):
                 self._find_first()
                 yield self._result(graph)
@@ -191,10 +215,11 @@ class _Improvement:
         Raises:
             PlanningLimitError: No plan was found that can be executed.
         """
-        with suppress(PlanningLimitError):  # a shortcut may still do what operators cannot
-            first = self._find_first()
-            yield self._result(None, first.graph_nodes, first.graph_edges)
-        self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
+        if self._best is None:
+            with suppress(PlanningLimitError):  # a shortcut may still do what operators cannot
+                first = self._find_first()
+                yield self._result(None, first.graph_nodes, first.graph_edges)
+            self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
         yield from self._around(abstract)
         if self._best is None:
             self._find_first()

@@ -21,8 +21,8 @@ from slap_ros.errors import (
 )
 from slap_ros.perception import ExactPerceiver, Perceiver, Percept
 from slap_ros.planning.options import Option, OptionExecution, OptionKind, OptionResult
-from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
-from slap_ros.planning.planner import Planner
+from slap_ros.planning.plan import PlanEdge, PlanningResult
+from slap_ros.planning.planner import ImprovingPlanner, Planner
 from slap_ros.relational import AtomSpace, State
 
 MAX_REPLANS = 5  # default; a deterministic world needs none
@@ -70,6 +70,8 @@ class PlanExecution:
         outcomes: How the execution of each edge ended, in order, up to the first that failed.
         steps: Environment steps that each of these edges took.
         unplanned: Why none was found; without a reason where one was.
+        improves: Whether it is a shorter rest of the plan before it, found while an edge of that
+            was executed.
     """
 
     first_step: int
@@ -78,6 +80,7 @@ class PlanExecution:
     outcomes: list[OptionResult] = field(default_factory=list)
     steps: list[int] = field(default_factory=list)
     unplanned: OptionResult = field(default_factory=lambda: OptionResult(ErrorCode.NONE))
+    improves: bool = False
 
 
 @dataclass
@@ -91,8 +94,9 @@ class EpisodeResult:
         shortcut_steps: Environment steps executed that shortcuts took.
         edges: What was executed, in order, of all plans.
         replans: Plans that replaced a diverged one.
-        planning_seconds: Planning time of all plans together, s.
-        edges_rolled_out: Options simulated while planning.
+        planning_seconds: Planning time of all plans together, s; what was found while the robot
+            moved took none.
+        edges_rolled_out: Options simulated for all plans.
         error: Why it ended, unless it is a success.
         plans: Every plan, in order, with what came of it.
     """
@@ -181,13 +185,13 @@ class Executor:
     def _plan_and_execute(self, episode: EpisodeResult) -> tuple[OptionResult, bool]:
         """One plan, up to its end or divergence; second, whether there was no plan."""
         try:
-            plan = self._plan(episode)
+            planned = self._plan(episode)
         except UNPLANNED as error:
             episode.plans[-1].unplanned = OptionResult(error.code, str(error))
             return episode.plans[-1].unplanned, True
-        return self._execute(plan, episode), False
+        return self._execute(planned, episode), False
 
-    def _plan(self, episode: EpisodeResult) -> Plan:
+    def _plan(self, episode: EpisodeResult) -> PlanningResult:
         execution = PlanExecution(episode.plan_length)
         episode.plans.append(execution)
         if self.begin_with is not None and len(episode.plans) == 1:
@@ -203,20 +207,39 @@ class Executor:
                 episode.planning_seconds += execution.seconds
         execution.planned = result
         episode.edges_rolled_out += result.edges_rolled_out
-        return result.plan
+        return result
 
-    def _execute(self, plan: Plan, episode: EpisodeResult) -> OptionResult:
-        execution = episode.plans[-1]
-        for edge in plan.edges:
-            before = episode.plan_length
-            result = self._execute_edge(edge, episode)
-            steps = episode.plan_length - before
-            execution.outcomes.append(result)
-            execution.steps.append(steps)
-            episode.edges.append(_executed(edge.option, steps, result.reached))
+    def _execute(self, planned: PlanningResult, episode: EpisodeResult) -> OptionResult:
+        number = 0
+        while number < len(planned.plan.edges):
+            # A robot would move meanwhile; the world waits.
+            shorter = self._improve_rest(planned, number)
+            result = self._execute_next(planned.plan.edges[number], episode)
             if not result.reached:
                 return result
+            number += 1
+            if shorter is not None:
+                planned, number = shorter, 0
+                execution = PlanExecution(episode.plan_length, shorter, improves=True)
+                episode.plans.append(execution)
+                episode.edges_rolled_out += shorter.edges_rolled_out
         return OptionResult(ErrorCode.NONE)
+
+    def _improve_rest(self, planned: PlanningResult, number: int) -> PlanningResult | None:
+        if not isinstance(self.planner, ImprovingPlanner):
+            return None
+        start = self.domain.to_plan_from(self._percept.state)
+        return self.planner.improve_rest(planned, number, start, self.goal)
+
+    def _execute_next(self, edge: PlanEdge, episode: EpisodeResult) -> OptionResult:
+        """Execute an edge of the newest plan, and note what came of it."""
+        execution, before = episode.plans[-1], episode.plan_length
+        result = self._execute_edge(edge, episode)
+        steps = episode.plan_length - before
+        execution.outcomes.append(result)
+        execution.steps.append(steps)
+        episode.edges.append(_executed(edge.option, steps, result.reached))
+        return result
 
     def _execute_edge(self, edge: PlanEdge, episode: EpisodeResult) -> OptionResult:
         try:

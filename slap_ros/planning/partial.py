@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from slap_ros.errors import NoDetectionError
 from slap_ros.planning.plan import Plan, PlanningResult
-from slap_ros.planning.planner import Planner
+from slap_ros.planning.planner import ImprovingPlanner, Planner
 from slap_ros.relational import AtomSpace, Layout, State
 
 
@@ -54,6 +54,15 @@ class PartialPlanner:
             for edge in result.plan.edges
         )
         return replace(result, plan=Plan(tuple(edges)))
+
+    def improve_rest(
+        self, planned: PlanningResult, number: int, state: State, goal: int
+    ) -> PlanningResult | None:
+        """See :class:`~slap_ros.planning.planner.ImprovingPlanner`; None unless all is detected."""
+        planner = self._planners.get(state.layout)
+        if state.layout != self.space.layout or not isinstance(planner, ImprovingPlanner):
+            return None
+        return planner.improve_rest(planned, number, state, goal)
 
     def _require_detected(self, state: State, goal: int) -> None:
         known = set(state.objects)

@@ -117,6 +117,11 @@ class PlanningResult(ShownInNotebooks):
         return self.steps / self.at_least if self.at_least else None
 
     @property
+    def is_proven(self) -> bool:
+        """Whether it is proven to be the shortest."""
+        return self.bound == 1.0
+
+    @property
     def steps(self) -> int:
         """Environment steps that the plan takes in the planner's model."""
         return self.plan.predicted_steps

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
@@ -31,6 +31,30 @@ class Planner(Protocol):
         Raises:
             UnsolvableError: There is no plan.
             PlanningLimitError: A limit was reached first.
+        """
+        ...
+
+
+@runtime_checkable
+class ImprovingPlanner(Planner, Protocol):
+    """Looks for a shorter rest of a plan while the robot executes it."""
+
+    def improve_rest(
+        self, planned: PlanningResult, number: int, state: State, goal: int
+    ) -> PlanningResult | None:
+        """A shorter rest of a plan, from where one of its edges leads in the model.
+
+        How much is searched for it depends on how long that edge takes in the model, and not on
+        time: so it is the same however fast the robot and the computer are.
+
+        Args:
+            planned: Plan under execution.
+            number: Index of the edge that is being executed.
+            state: State in which the edge began.
+            goal: Mask of the atoms that the plan is to reach.
+
+        Returns:
+            The rest; None where none was found that is shorter, or the plan is good enough.
         """
         ...
 

@@ -12,6 +12,7 @@ from slap_ros.planning.effort import Effort
 ANYTIME = "anytime"
 DEFAULT_PLANNER = ANYTIME
 WITH_SHORTCUTS = (ANYTIME, "lazy", "exhaustive")  # planners that can use them
+SETTINGS = ("within", "effort", "improve")  # of anytime
 
 
 @dataclass(frozen=True)
@@ -39,33 +40,37 @@ class PlannerChoice:
             return cls(name)
         if name != ANYTIME:
             raise InvalidParameterError(
-                f"planner {text!r}: only {ANYTIME} has settings, within and effort; the others "
-                "search until they have their plan"
+                f"planner {text!r}: only {ANYTIME} has settings ({', '.join(SETTINGS)}); the "
+                "others search until they have their plan"
             )
         given = dict(_setting(text, part) for part in settings.split(","))
-        if unknown := sorted(given.keys() - {"within", "effort"}):
+        if unknown := sorted(given.keys() - set(SETTINGS)):
             raise InvalidParameterError(
-                f"planner {text!r}: unknown setting {unknown[0]!r}; there are within and effort"
+                f"planner {text!r}: unknown setting {unknown[0]!r}; there are {', '.join(SETTINGS)}"
             )
         try:
             within, factor = float(given.get("within", 1.0)), int(given.get("effort", 1))
+            improve = int(given["improve"]) if "improve" in given else None
         except ValueError as error:
             raise InvalidParameterError(f"planner {text!r}: {error}") from error
-        return cls(name, Effort.times(factor, within))
+        return cls(name, Effort.times(factor, within, improve))
 
 
-def with_settings(planner: str, within: float | None, effort: int | None) -> str:
+def with_settings(
+    planner: str, within: float | None, effort: int | None, improve: int | None = None
+) -> str:
     """The choice of a planner with settings that were given by themselves.
 
     Args:
         planner: Choice of the planner.
         within: Factor of the bound that is good enough; None for the usual one.
         effort: Factor of the usual effort; None for 1.
+        improve: Options simulated per step of the robot while it moves; None for the usual number.
 
     Raises:
         InvalidParameterError: The planner has no such settings, or they make no sense.
     """
-    given = {"within": within, "effort": effort}
+    given = dict(zip(SETTINGS, (within, effort, improve), strict=True))
     settings = ",".join(f"{name}={value}" for name, value in given.items() if value is not None)
     if not settings:
         return planner

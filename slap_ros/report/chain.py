@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from slap_ros.bags.recording import RecordedEpisode
 from slap_ros.evaluation.atom_names import AtomNames, atom_names
 from slap_ros.evaluation.run_trace import RunTrace
-from slap_ros.messages.events import PlanEventKind
+from slap_ros.messages.events import ANNOUNCING, PlanEventKind
 from slap_ros.messages.protocols import PlanMessage
 from slap_ros.planning.options import OptionKind
 from slap_ros.report.timeline import call
@@ -38,6 +38,7 @@ class PlanChain:
     start: tuple[str, ...]  # atoms of its first state that one of its edges changes
     edges: tuple[ChainEdge, ...]
     predicted_steps: int
+    improves: bool = False  # whether it is a shorter rest of the plan before it
 
 
 def chains(trace: RunTrace, episode: RecordedEpisode) -> tuple[PlanChain, ...]:
@@ -52,7 +53,8 @@ def texts(atoms: AtomNames) -> tuple[str, ...]:
 
 def _chain(plan: PlanMessage, trace: RunTrace, episode: RecordedEpisode) -> PlanChain:
     events = [event for event in trace.events if event.plan_number == plan.number]
-    made = next((e.step for e in events if e.kind == PlanEventKind.PLANNED), trace.first_step)
+    announced = next((event for event in events if event.kind in ANNOUNCING), None)
+    made = trace.first_step if announced is None else announced.step
     outcomes: dict[int, str] = {}
     for event in events:
         if event.kind == PlanEventKind.EDGE_STARTED:
@@ -85,4 +87,5 @@ def _chain(plan: PlanMessage, trace: RunTrace, episode: RecordedEpisode) -> Plan
         start=texts(start & touched),
         edges=tuple(edges),
         predicted_steps=plan.predicted_steps,
+        improves=announced is not None and announced.kind == PlanEventKind.IMPROVED,
     )

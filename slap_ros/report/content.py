@@ -75,8 +75,13 @@ class RunReport:
 
     @property
     def replan_steps(self) -> tuple[int, ...]:
-        """The steps at which plans after the first were made."""
-        return tuple(chain.step for chain in self.chains if chain.number > 0)
+        """The steps at which plans were made in the place of one that diverged."""
+        return tuple(one.step for one in self.chains if one.number > 0 and not one.improves)
+
+    @property
+    def improvements(self) -> tuple[PlanChain, ...]:
+        """The plans that are a shorter rest of the one before, found while the robot moved."""
+        return tuple(chain for chain in self.chains if chain.improves)
 
 
 @dataclass(frozen=True)

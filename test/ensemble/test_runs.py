@@ -20,7 +20,8 @@ from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.domains import get_domain
-from slap_ros.evaluation.experiment import Experiment
+from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.experiment import Experiment, solve
 from slap_ros.messages.decode import stamp_ns
 from slap_ros.messages.interfaces import ATOMS, MARKERS, STATE
 from slap_ros.perception import NoisyPerceiver, Quality
@@ -161,6 +162,25 @@ def test_with_noise_the_ensemble_errs_as_an_experiment_does(network, tmp_path, s
         offline.error.code,
     )
     assert (live.replans > 0) == replans
+
+
+def test_planning_goes_on_while_the_robot_moves_as_in_an_experiment(network, tmp_path):
+    choice = DomainChoice("obstacle_tower", "fair:obstacles=5")
+    settings = RunSettings(
+        choice, 302, 0, "anytime", tmp_path / "bag", shortcuts="none", patience=PATIENCE
+    )
+    live = run(RunRequest(settings, timeout_s=200, in_process=True), ignore)
+    evaluation = evaluate_bag(tmp_path / "bag")
+    assert (evaluation.runs, evaluation.damage) == ([live], None)
+    domain = get_domain(choice.name, choice.preset)
+    offline = solve(domain, domain.task(302), PURE_PLANNING, "anytime")
+    assert offline.plan_length < offline.plans[0].planned.steps
+    assert (live.success, live.plan_length, live.replans, live.edges_rolled_out) == (
+        True,
+        offline.plan_length,
+        0,
+        offline.edges_rolled_out,
+    )
 
 
 def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
