@@ -89,9 +89,8 @@ def evaluate(
     planner = with_settings(planner, within, effort, 0 if no_improve else None)
     chosen = open_chosen(domain, preset, skills)
     settings = {"preset": chosen.preset, "tasks": tasks, "seeds": seeds, "first_seed": first_seed}
-    settings |= {"samples": samples, "planner": planner}
     besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting)
-    settings |= {name: value for name, value in besides if value}
+    settings |= {"samples": samples, "planner": planner} | {n: v for n, v in besides if v}
     named = {"shortcuts": shortcuts, "against": against or []}
     command = command_line("evaluate", domain, **named, **settings)
     if output is not None:
