@@ -29,7 +29,7 @@ Step = tuple[int, Option, int]  # abstract state, what is done there, and where 
 
 
 class Corridor(AbstractGraph):
-    """An abstract graph in which search may follow every edge, in circles as well."""
+    """An abstract graph in which search may follow every edge."""
 
     def forward_edges(self) -> list[list[Edge]]:
         """All edges, by source node."""

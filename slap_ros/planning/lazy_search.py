@@ -268,8 +268,15 @@ class _LazySearch:
         return edge.option.target(self._graph.nodes[edge.target])
 
     def _expand(self, vertex: Vertex) -> None:
-        """Queue the edges out of a vertex, each with its bound."""
+        """Queue the edges out of a vertex, each with its bound.
+
+        Not those that lead back: a block that is picked up and put down again lies a little
+        elsewhere, so that there would be no end to such circles.
+        """
+        before = set(vertex.nodes())
         for edge in self._frontier.edges_from(vertex.node):
+            if edge.target in before:
+                continue
             skill = edge.option.skill
             bound = skill.lower_bound(vertex.state, edge.option.objects)
             self._frontier.push(vertex, edge, max(skill.least_steps, bound))

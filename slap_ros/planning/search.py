@@ -71,6 +71,13 @@ class Vertex:
         """Vertices with equal keys have equal futures."""
         return self.node, self.state.key
 
+    def nodes(self) -> Iterator[int]:
+        """The nodes of the path to it, from its own back to the start."""
+        vertex: Vertex | None = self
+        while vertex is not None:
+            yield vertex.node
+            vertex = vertex.parent
+
 
 @dataclass(frozen=True)
 class FailedPath:

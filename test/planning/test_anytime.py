@@ -9,11 +9,15 @@ from hypothesis import strategies as st
 import slap_ros
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
+from slap_ros.planning.abstract_graph import Edge
 from slap_ros.planning.anytime import AnytimePlanner, PlanningInterrupted
+from slap_ros.planning.corridor import Corridor
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
 from slap_ros.planning.lazy_search import SearchLimits, search_lazily
+from slap_ros.planning.model import Rollout
 from slap_ros.planning.mutexes import may_hold_together
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.plan import bound_as_text
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import Problem
@@ -23,7 +27,7 @@ from slap_ros.relational import State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
 from support.marks import slow
-from test.planning.test_search import LAYOUT, MadeUpModel, made_up_graphs
+from test.planning.test_search import LAYOUT, MadeUpModel, MadeUpSkill, made_up_graphs
 
 
 class RememberingModel(MadeUpModel):
@@ -157,6 +161,26 @@ def improvements(domain, task, effort, library=None):
     return list(planner.improve(task.initial_state, goal))
 
 
+class EverNewModel(MadeUpModel):
+    """Each roll-out ends where none has been, and the goal is never reached."""
+
+    def roll_out(self, option, state, target):
+        self.executed += 1
+        return Rollout(option.skill.name != "to_goal", 1, State(LAYOUT, [float(self.executed)]))
+
+
+def test_a_path_near_a_plan_does_not_go_round():
+    """It would never end: where it comes back to, it has not been in this low-level state."""
+    goal, model = 1 << 20, EverNewModel()
+    graph = Corridor(goal, nodes=[1, 2, goal], depth=[0, 0, 0])
+    for name, source, target in (("up", 0, 1), ("down", 1, 0), ("to_goal", 1, 2)):
+        option = Option(OptionKind.OPERATOR, MadeUpSkill(name, 0, 0.0), ())
+        graph.edges.append(Edge(source, target, option))
+    outcome = search_lazily(graph, START, model, SearchLimits(rollouts=50))
+    assert (outcome.plan, outcome.stopped) == (None, False)
+    assert model.executed == 2
+
+
 def test_a_tall_tower_is_planned_for_within_the_effort_and_each_plan_is_better():
     domain = slap_ros.make("obstacle_tower", obstacles=6)
     task, effort = domain.task(seed=1), Effort(rollouts=12, tests=10_000)
@@ -223,7 +247,7 @@ def test_an_interrupt_leaves_the_best_plan_so_far():
     first = improvements(domain, task, Effort(rollouts=1))[0]
     problem = Problem.of(domain, task.initial_state)
     goal = problem.model.space.mask(task.goal)
-    problem.model._world = InterruptedWorld(problem.model._world, 3 * first.steps)
+    problem.model._world = InterruptedWorld(problem.model._world, first.steps + 20)
     with pytest.raises(PlanningInterrupted) as caught:
         AnytimePlanner(problem).plan(task.initial_state, goal)
     assert caught.value.best.plan == first.plan
