@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from slap_ros.core import Action, Policy
-from slap_ros.errors import SkillNotApplicableError
+from slap_ros.errors import InvalidStateError, SkillNotApplicableError
 from slap_ros.policies.mlp_policy import Weights
 from slap_ros.relational import Object, State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
@@ -93,14 +93,18 @@ class GroundShortcut:
             The policy that follows the rollout.
 
         Raises:
-            SkillNotApplicableError: Not so many rollouts succeeded.
+            SkillNotApplicableError: Not so many rollouts succeeded, or there can be none from what
+                was perceived.
         """
-        successes = self.rollouts.successes(self.shortcut, self.encoder, state)
+        called = f"{self.name}({', '.join(obj.name for obj in objects)})"
+        try:
+            successes = self.rollouts.successes(self.shortcut, self.encoder, state)
+        except InvalidStateError as error:
+            raise SkillNotApplicableError(f"{called} cannot be tried out: {error}") from error
         if self.attempt >= len(successes):
             raise SkillNotApplicableError(
-                f"{self.name}({', '.join(obj.name for obj in objects)}) reaches its target "
-                f"{len(successes)} times within {self.step_limit} steps in the model; attempt "
-                f"{self.attempt + 1} was asked for"
+                f"{called} reaches its target {len(successes)} times within {self.step_limit} "
+                f"steps in the model; attempt {self.attempt + 1} was asked for"
             )
         return RolloutFollower(self, successes[self.attempt], self.encoder.kept_grasp(state))
 

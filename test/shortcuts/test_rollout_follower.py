@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
+from slap_ros.errors import SkillNotApplicableError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionKind
@@ -63,6 +64,16 @@ def test_the_rollout_is_followed_where_objects_are_a_little_elsewhere(shortcut_o
     for state, choice in zip(predicted.states, predicted.actions, strict=True):
         action = follow(moved(state, "block", 0.003))
         assert (action == shortcut.skill.command(choice)).all()
+
+
+def test_a_state_that_cannot_be_is_no_start_and_says_why(shortcut_of_plan):
+    """Perceived with noise, blocks side by side are inside one another: the next look may do."""
+    shortcut, start = shortcut_of_plan
+    free = [o for o in start.objects if o.type.name == "block" and start.get(o, "held") < 0.5]
+    beside = float(start.get(free[0], "x")) + 0.001
+    inside = start.replace({(free[1], "x"): beside})
+    with pytest.raises(SkillNotApplicableError, match=r"tried out: .* inside one another"):
+        shortcut.skill.start(inside, shortcut.objects)
 
 
 def test_the_rollout_is_left_where_the_robot_is_elsewhere(shortcut_of_plan):
