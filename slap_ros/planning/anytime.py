@@ -120,7 +120,9 @@ class AnytimePlanner:
         found: list[PlanningResult] = []
         with suppress(UnsolvableError, PlanningLimitError):  # of another plan than the rest
             found.extend(replace(self, effort=effort).improve(ahead.final, goal, rest))
-        return found[-1] if found and found[-1].steps < rest.predicted_steps else None
+        if not found or found[-1].steps >= rest.predicted_steps:
+            return None
+        return replace(found[-1], origin=planned.origin)
 
     def _is_good(self, planned: PlanningResult) -> bool:
         return planned.bound is not None and planned.bound <= self.effort.within
