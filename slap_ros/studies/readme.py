@@ -122,7 +122,7 @@ def _compared(domain: str, results: Path) -> list[str]:
 
 def front_skill_table(results: Path) -> MarkdownTable:
     """Task progress by goal of ``slap study acquisition``, and the paper's, a row per domain."""
-    data = [parse_json(read_text(path)) for path in sorted(results.glob("acquisition_*.json"))]
+    data = _data_of("acquisition", results)
     return MarkdownTable(
         ("", "task progress, by goal", "LG-SAIL's"),
         [[f"`{one['domain']}`", *_of_skills(one)[2:4]] for one in data],
@@ -170,8 +170,14 @@ def skill_table(results: Path) -> MarkdownTable:
         "LG-SAIL's",
         "environment steps of a training",
     )
-    data = [parse_json(read_text(path)) for path in sorted(results.glob("acquisition_*.json"))]
+    data = _data_of("acquisition", results)
     return MarkdownTable(columns, [_of_skills(one) for one in data])
+
+
+def _data_of(study: str, results: Path) -> list[dict[str, Any]]:
+    """The data of a study, of each domain; another study's name may begin with its name."""
+    found = (parse_json(read_text(path)) for path in sorted(results.glob(f"{study}_*.json")))
+    return [one for one in found if one["study"] == study]
 
 
 def _of_skills(data: Mapping[str, Any]) -> list[str]:
@@ -191,7 +197,7 @@ def _of_skills(data: Mapping[str, Any]) -> list[str]:
 
 def replanning_table(results: Path) -> MarkdownTable:
     """Every row of ``slap study replanning``, of all domains for which there is one."""
-    data = [parse_json(read_text(path)) for path in sorted(results.glob("replanning_*.json"))]
+    data = _data_of("replanning", results)
     return MarkdownTable(
         (
             "domain",
