@@ -24,6 +24,17 @@ SETTINGS = {
     "fair": StowTasks(),
     "paper": StowTasks(front_x=(0.47, 0.47), front_y=(0.355, 0.355), front_turn=(0.0, 0.0)),
 }
+# Both skills of a pair take 80 environment steps, and each has to be learned in two cabinets, one
+# after the other.
+CHAINS = {
+    "cloning.anywhere": True,
+    "cloning.horizon": 80,
+    "cloning.straightened": 80,
+    "exploration.nodes": 9,
+    "exploration.tasks": 2,
+    "horizon": 90,
+    "starts": 120,
+}
 MODEL = BenchtopModel(
     types=model.TYPES,
     predicates=model.PREDICATES,
@@ -41,6 +52,7 @@ MODEL = BenchtopModel(
     ),
     scene_of=scene_of,
     metrics=drawers.METRICS,
+    chains=CHAINS,
 )
 
 
