@@ -33,6 +33,7 @@ CHAINS = {
     "exploration.nodes": 9,
     "exploration.tasks": 2,
     "horizon": 90,
+    "sampling.samples": 4,
     "starts": 120,
 }
 MODEL = BenchtopModel(
