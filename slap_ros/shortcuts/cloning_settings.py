@@ -27,8 +27,8 @@ class ShortcutCloningSettings:
         n_envs: Number of environments in which the policy is measured.
         parts: Number of parts that the environments are divided into.
         total_steps: Environment steps in which the policy is measured.
-        horizon: Environment steps for which a shortcut is tried out at least when planning; 0 for
-            no more than others.
+        horizon: Environment steps for which a shortcut is tried out at least when planning, as all
+            are for those of :class:`~slap_ros.shortcuts.sampling.Sampling`.
         anywhere: Whether a start is drawn from all places where operators lead on by the shortcut,
             and not taken after the same operators each time.
     """
@@ -43,7 +43,7 @@ class ShortcutCloningSettings:
     n_envs: int = 16
     parts: int = 1
     total_steps: int = 4_000
-    horizon: int = 0
+    horizon: int = 1
     anywhere: bool = False
 
     @property
@@ -53,5 +53,9 @@ class ShortcutCloningSettings:
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, without what work folders lack from when there was no other way."""
-        data = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in data.items() if name not in LATER or value}
+        values = [(field, getattr(self, field.name)) for field in fields(self)]
+        return {
+            field.name: value
+            for field, value in values
+            if field.name not in LATER or value != field.default
+        }

@@ -398,7 +398,7 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
     learner = learn_stages(attempt, len(attempt.settings.stages), recorder, processes)
     record = recorder.record() | validation_record(work.plan_lengths)
     cloning = attempt.settings.cloning
-    horizon = 0 if cloning is None else cloning.horizon
+    horizon = 1 if cloning is None else cloning.horizon
     shortcut = Shortcut(attempt.signature, learner.policy(), learner.shortest, record, horizon)
     save_shortcut(work.shortcut, shortcut)
     work.finished.touch()

@@ -23,15 +23,15 @@ class Shortcut:
         shortest: Environment steps of the shortest success in training; half of them is the
             lower bound that search assumes.
         record: Record of the training: figures by name.
-        horizon: Environment steps for which it is tried out at least when planning; 0 for no more
-            than :class:`~slap_ros.shortcuts.sampling.Sampling` says.
+        horizon: Environment steps for which it is tried out at least when planning, as all are for
+            those of :class:`~slap_ros.shortcuts.sampling.Sampling`.
     """
 
     signature: Signature
     policy: SampledPolicy
     shortest: int
     record: Mapping[str, Any] = field(default_factory=dict, compare=False)
-    horizon: int = 0
+    horizon: int = 1
 
     @property
     def name(self) -> str:

@@ -199,7 +199,7 @@ def save_shortcut(folder: Path, shortcut: Shortcut) -> None:
         {
             "signature": shortcut.signature.as_json(),
             "shortest": shortcut.shortest,
-            **({"horizon": shortcut.horizon} if shortcut.horizon else {}),
+            **({"horizon": shortcut.horizon} if shortcut.horizon > 1 else {}),
             "record": dict(shortcut.record),
             "sha256": checksum,
         },
@@ -216,11 +216,11 @@ def load_shortcut(folder: Path) -> Shortcut:
     try:
         signature = Signature.from_json(about["signature"])
         shortest, record = int(about["shortest"]), dict(about["record"])
-        horizon = int(about.get("horizon", 0))
+        horizon = int(about.get("horizon", 1))
         checksum = str(about["sha256"])
         if not 1 <= shortest <= MAX_SHORTEST:
             raise ValueError(f"its shortest success has {shortest:.3g} steps")
-        if not 0 <= horizon <= MAX_SHORTEST:
+        if not 1 <= horizon <= MAX_SHORTEST:
             raise ValueError(f"it is tried out for {horizon:.3g} steps")
     except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise InvalidLibraryError(f"{folder / SHORTCUT}: damaged: {error!r}") from error

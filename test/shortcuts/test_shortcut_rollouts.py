@@ -171,4 +171,4 @@ def test_a_shortcut_that_takes_longer_is_tried_out_for_longer(tmp_path):
         save_shortcut(tmp_path / shortcut.name, shortcut)
         assert load_shortcut(tmp_path / shortcut.name).horizon == shortcut.horizon
         text = (tmp_path / shortcut.name / "shortcut.json").read_text()
-        assert ('"horizon"' in text) == bool(shortcut.horizon)
+        assert ('"horizon"' in text) == (shortcut is longer)

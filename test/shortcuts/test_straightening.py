@@ -157,7 +157,7 @@ def test_an_execution_that_ends_in_motion_goes_on_until_nothing_moves(stowing):
 
 
 def test_what_skills_show_with_one_object_is_not_asked_for_with_all_at_once(stowing):
-    hammers, space, graph, chains, _, (open_first, pick, _, close) = stowing
+    hammers, space, graph, chains, _, (_, pick, _, close) = stowing
     signature = chains.signature(pick.target, close.target)
     assert signature.counted
     assert Signature.from_json(signature.as_json()) == signature
@@ -178,15 +178,13 @@ def test_what_skills_show_with_one_object_is_not_asked_for_with_all_at_once(stow
 
 
 def test_starts_are_drawn_from_wherever_the_shortcut_leads_on(stowing):
-    hammers, space, graph, chains, _, (_, pick, *_) = stowing
+    hammers, _, _, chains, _, (_, pick, *_) = stowing
     signature, steps = chains.signature(0, pick.target), {"Open": 40, "Pick": 40}
     records = [
         find_start(hammers, SEED, TASK, signature, None, steps, False, np.random.default_rng(i))
         for i in range(4)
     ]
-    again = find_start(
-        hammers, SEED, TASK, signature, None, steps, False, np.random.default_rng(0)
-    )
+    again = find_start(hammers, SEED, TASK, signature, None, steps, False, np.random.default_rng(0))
     assert again == records[0]
     assert len({record.add for record in records}) > 1  # other hammers, other drawers
 
