@@ -24,7 +24,7 @@ SETTINGS = {
     "fair": StowTasks(),
     "paper": StowTasks(front_x=(0.47, 0.47), front_y=(0.355, 0.355), front_turn=(0.0, 0.0)),
 }
-# Two skills take 80 environment steps, and what is done at one cabinet is done at the other one too.
+# Two skills take 80 environment steps, and the same is done at one cabinet and then at the other.
 # Planning with many samples takes a minute for one task of validation, and finds little more.
 CHAINS = {
     "cloning.anywhere": True,
