@@ -25,7 +25,7 @@ SETTINGS = {
     "paper": StowTasks(front_x=(0.47, 0.47), front_y=(0.355, 0.355), front_turn=(0.0, 0.0)),
 }
 # Two skills take 80 environment steps, and the same is done at one cabinet and then at the other.
-# Planning with many samples takes a minute for one task of validation, and finds little more.
+# With four samples, planning for one task of validation takes most of a minute.
 CHAINS = {
     "cloning.anywhere": True,
     "cloning.horizon": 80,
