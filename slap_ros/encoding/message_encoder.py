@@ -317,7 +317,7 @@ class MessageEncoder:
             kind=OptionKind.SHORTCUT.value,
             name=shortcut.name,
             parameters=[kind.partition("(")[0] for kind in shortcut.signature.roles],
-            step_limit=sampling.horizon,
+            step_limit=shortcut.step_limit(sampling),
             training=self.key_values(shortcut.record),
         )
 

@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
+
+LATER = ("horizon", "anywhere")  # settings that came later, which change nothing where not given
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,10 @@ class ShortcutCloningSettings:
         n_envs: Number of environments in which the policy is measured.
         parts: Number of parts that the environments are divided into.
         total_steps: Environment steps in which the policy is measured.
+        horizon: Environment steps for which a shortcut is tried out at least when planning, as all
+            are for those of :class:`~slap_ros.shortcuts.sampling.Sampling`.
+        anywhere: Whether a start is drawn from all places where operators lead on by the shortcut,
+            and not taken after the same operators each time.
     """
 
     straightened: int = 120
@@ -36,8 +43,19 @@ class ShortcutCloningSettings:
     n_envs: int = 16
     parts: int = 1
     total_steps: int = 4_000
+    horizon: int = 1
+    anywhere: bool = False
 
     @property
     def rollout_steps(self) -> int:
         """Environment steps between two reports, all environments together."""
         return self.n_envs
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object, without what work folders lack from when there was no other way."""
+        values = [(field, getattr(self, field.name)) for field in fields(self)]
+        return {
+            field.name: value
+            for field, value in values
+            if field.name not in LATER or value != field.default
+        }

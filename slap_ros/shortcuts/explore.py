@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
@@ -62,6 +62,7 @@ class ShortcutCandidate:
         beyond: Whether operators alone reach the second abstract state in no plan, so that it is
             no node of the abstract planning graph.
         found_by: Names of the exploration policies whose rollouts reached the target.
+        replaced: Names of the skills that show it; none where something else found it.
     """
 
     signature: Signature
@@ -72,6 +73,7 @@ class ShortcutCandidate:
     expected_saving: float
     beyond: bool = False
     found_by: tuple[str, ...] = (RANDOM,)
+    replaced: OperatorPath = ()
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
@@ -84,6 +86,8 @@ class ShortcutCandidate:
             del data["beyond"]
         if self.found_by == (RANDOM,):
             del data["found_by"]
+        if not self.replaced:
+            del data["replaced"]
         return data
 
     @classmethod
@@ -100,8 +104,11 @@ class ShortcutCandidate:
             raise TypeError(f"{numbers} are not all numbers")
         operator_path = tuple(str(name) for name in values["operator_path"])
         found_by = tuple(str(name) for name in values.get("found_by", (RANDOM,)))
+        replaced = tuple(str(name) for name in values.get("replaced", ()))
         signature, beyond = Signature.from_json(values["signature"]), bool(values.get("beyond"))
-        return cls(signature, operator_path, **numbers, beyond=beyond, found_by=found_by)
+        return cls(
+            signature, operator_path, **numbers, beyond=beyond, found_by=found_by, replaced=replaced
+        )
 
 
 @dataclass(frozen=True)
@@ -311,8 +318,11 @@ class Explorer:
                     reached = _Reached(found.states[-1], found.steps, [found.steps])
                     reached.found_by[STRAIGHTENED] = None
                     target = _Destination(nodes[end], to_go[end], beyond=False)
-                    yield self._candidate(
-                        vertex, RolloutOrigin(vertex, vertex.state), target, reached
+                    origin = RolloutOrigin(vertex, vertex.state)
+                    yield replace(
+                        self._candidate(vertex, origin, target, reached),
+                        signature=chains.signature(vertex.node, end),
+                        replaced=tuple(edge.option.skill.name for edge in pair),
                     )
 
     @property

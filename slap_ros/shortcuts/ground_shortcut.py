@@ -63,7 +63,7 @@ class GroundShortcut:
     @property
     def step_limit(self) -> int:
         """Environment steps after which it counts as failed."""
-        return self.rollouts.sampling.horizon
+        return self.shortcut.step_limit(self.rollouts.sampling)
 
     @property
     def least_steps(self) -> int:

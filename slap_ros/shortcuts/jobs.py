@@ -119,6 +119,7 @@ def start(
     operator_path: OperatorPath,
     operator_steps: Mapping[str, float],
     beyond: bool = False,
+    anywhere: bool = False,
 ) -> dict[str, Any] | None:
     """The start of a shortcut in one task; see :func:`~slap_ros.shortcuts.starts.find_start`.
 
@@ -129,18 +130,21 @@ def start(
         operator_path: Names of the operators that lead to the start.
         operator_steps: Mean environment steps of each operator, by name.
         beyond: Whether the shortcut leads to abstract states that operators alone do not reach.
+        anywhere: Whether it is drawn from all that any operators lead to.
 
     Returns:
         A :class:`~slap_ros.shortcuts.starts.StartRecord` as JSON; None where there is no start.
     """
+    drawing = np.random.default_rng([distribution.seed, STARTS.first, index]) if anywhere else None
     found = find_start(
         distribution.make_domain(),
         distribution.task_seed,
         STARTS.index(index),
         signature,
-        operator_path,
+        None if anywhere else operator_path,
         operator_steps,
         beyond,
+        drawing,
     )
     return None if found is None else found.as_json()
 
@@ -393,7 +397,9 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
     recorder = attempt.recorder()
     learner = learn_stages(attempt, len(attempt.settings.stages), recorder, processes)
     record = recorder.record() | validation_record(work.plan_lengths)
-    shortcut = Shortcut(attempt.signature, learner.policy(), learner.shortest, record)
+    cloning = attempt.settings.cloning
+    horizon = 1 if cloning is None else cloning.horizon
+    shortcut = Shortcut(attempt.signature, learner.policy(), learner.shortest, record, horizon)
     save_shortcut(work.shortcut, shortcut)
     work.finished.touch()
     return shortcut

@@ -199,6 +199,7 @@ def save_shortcut(folder: Path, shortcut: Shortcut) -> None:
         {
             "signature": shortcut.signature.as_json(),
             "shortest": shortcut.shortest,
+            **({"horizon": shortcut.horizon} if shortcut.horizon > 1 else {}),
             "record": dict(shortcut.record),
             "sha256": checksum,
         },
@@ -215,9 +216,12 @@ def load_shortcut(folder: Path) -> Shortcut:
     try:
         signature = Signature.from_json(about["signature"])
         shortest, record = int(about["shortest"]), dict(about["record"])
+        horizon = int(about.get("horizon", 1))
         checksum = str(about["sha256"])
         if not 1 <= shortest <= MAX_SHORTEST:
             raise ValueError(f"its shortest success has {shortest:.3g} steps")
+        if not 1 <= horizon <= MAX_SHORTEST:
+            raise ValueError(f"it is tried out for {horizon:.3g} steps")
     except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise InvalidLibraryError(f"{folder / SHORTCUT}: damaged: {error!r}") from error
     if signature.name != folder.name:
@@ -225,4 +229,5 @@ def load_shortcut(folder: Path) -> Shortcut:
             f"{folder}: the signature inside is that of {signature.name}; the folder was renamed "
             "or the file changed"
         )
-    return Shortcut(signature, load_policy(folder / POLICY, checksum, SHORTCUT), shortest, record)
+    policy = load_policy(folder / POLICY, checksum, SHORTCUT)
+    return Shortcut(signature, policy, shortest, record, horizon)

@@ -147,7 +147,8 @@ class ShortcutRollouts:
         rng = np.random.default_rng(int.from_bytes(seed, "little"))
         if len(self._begun) == MOST_BEGUN:
             self._finish(next(iter(self._begun)))  # the oldest
-        self._begun[key] = ShortcutTrial(self._worlds, shortcut.policy, encoder, state, rng)
+        limit = shortcut.step_limit(self.sampling)
+        self._begun[key] = ShortcutTrial(self._worlds, shortcut.policy, encoder, state, rng, limit)
         return True
 
     def _finish(self, key: Key) -> None:

@@ -189,6 +189,7 @@ class ShortcutTrial:
         encoder: ObservationEncoder,
         state: State,
         rng: np.random.Generator,
+        limit: int,
     ) -> None:
         """Begin with no steps made.
 
@@ -198,16 +199,17 @@ class ShortcutTrial:
             encoder: Encoder of observations for the change to be made.
             state: State to begin in.
             rng: Generator that draws the noise of this trial alone.
+            limit: Environment steps of a rollout at most.
         """
         self._worlds, self._sampling, self._rng = worlds, worlds.sampling, rng
-        self._encoder, self._state = encoder, state
+        self._encoder, self._state, self._limit = encoder, state, limit
         scale = np.linspace(1.0, MAX_NOISE_SCALE, worlds.at_once, dtype=np.float32)
         temperature = (self._sampling.temperature * scale)[:, None]
         self._sample = _observing(policy.sampler(rng, temperature))
         self._deterministic = _DeterministicRollout(
-            RolloutBatch(worlds, encoder, state, _mean(policy), self._sampling.horizon)
+            RolloutBatch(worlds, encoder, state, _mean(policy), limit)
         )
-        self._noisy = self._batch(self._sample, self._sampling.horizon)  # the first of them
+        self._noisy = self._batch(self._sample, limit)  # the first of them
 
     def lasts(self, steps: int) -> bool:
         """Whether no rollout, of those made before variations, succeeds within so many steps.
@@ -244,7 +246,7 @@ class ShortcutTrial:
                 break
             batch = self._noisy
             if failures:
-                batch = self._batch(self._sample, best.limit(sampling.horizon))
+                batch = self._batch(self._sample, best.limit(self._limit))
             best.add(batch.run())
         for number in range(sampling.refinements if best.all else 0):
             self._refine(best, sampling.spread * SPREAD_DECAY**number)

@@ -134,12 +134,15 @@ class Signature:
         delete: Atoms deleted: the predicate, and the roles that are its arguments.
         context: Names of the predicates about what is held that hold where it was learned: a slap
             with a block in the hand is another one than with the hand empty.
+        counted: Whether it matches changes of exactly as many atoms and objects. What two skills
+            show is done with one object; with several it would be done again and again.
     """
 
     roles: tuple[Kind, ...]
     add: frozenset[tuple[str, tuple[int, ...]]]
     delete: frozenset[tuple[str, tuple[int, ...]]]
     context: frozenset[str] = frozenset()
+    counted: bool = False
 
     @classmethod
     def of(
@@ -168,12 +171,13 @@ class Signature:
         return cls(roles, lifted(change.add), lifted(change.delete), context)
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object."""
+        """A JSON object, which says that it is counted only where it is."""
         return {
             "roles": list(self.roles),
             "add": [[predicate, list(roles)] for predicate, roles in sorted(self.add)],
             "delete": [[predicate, list(roles)] for predicate, roles in sorted(self.delete)],
             "context": sorted(self.context),
+            **({"counted": True} if self.counted else {}),
         }
 
     @classmethod
@@ -189,7 +193,8 @@ class Signature:
             return frozenset((str(name), tuple(int(i) for i in about)) for name, about in lists)
 
         context = frozenset(str(name) for name in data["context"])
-        signature = cls(roles, atoms(data["add"]), atoms(data["delete"]), context)
+        counted = bool(data.get("counted", False))
+        signature = cls(roles, atoms(data["add"]), atoms(data["delete"]), context, counted)
         used = {i for _, about in signature.add | signature.delete for i in about}
         if not used <= set(range(len(roles))):
             raise ValueError(f"an atom is about a role that is not among the {len(roles)}")
@@ -217,12 +222,14 @@ class Signature:
     def name(self) -> str:
         """The predicates that are added, and a hash that tells different signatures apart."""
         parts = (self.roles, sorted(self.add), sorted(self.delete), sorted(self.context))
-        text = repr(parts)
+        text = repr((*parts, "counted") if self.counted else parts)
         words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
         return f"{words}-{sha256(text.encode()).hexdigest()[:8]}"
 
     def matches(self, change: Change, source: int, space: AtomSpace) -> bool:
         """Whether a change has the patterns of the signature, with any number of objects.
+
+        Of a counted signature, with as many objects and atoms as it has itself.
 
         What is already so need not change: a tower of one block has none on another, and of none
         the top becomes free. Objects of each kind must change, and one pattern at least must be
@@ -253,6 +260,8 @@ class Signature:
             Masks, each with those of its atoms that must hold in the source while its others must
             not; None where the change does not have the patterns, whatever the source.
         """
+        if self.counted and not self._counts_fit(change, space):
+            return None
         kind = kinds(space)
         found: set[Pattern] = set()
         mine: set[Object] = set()
@@ -273,6 +282,13 @@ class Signature:
         ):
             return None
         return [_already_so(pattern, mine, space) for pattern in self.patterns - found]
+
+    def _counts_fit(self, change: Change, space: AtomSpace) -> bool:
+        """Whether a change adds and deletes as many atoms, about as many objects of each kind."""
+        kind = kinds(space)
+        objects = Counter(kind[obj] for obj in concerned(change, space))
+        atoms = change.add.bit_count(), change.delete.bit_count()
+        return atoms == (len(self.add), len(self.delete)) and objects == self.slots
 
 
 def _signs(patterns: Collection[Pattern]) -> set[str]:

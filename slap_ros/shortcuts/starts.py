@@ -35,6 +35,8 @@ from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 from slap_ros.shortcuts.way_on import steps_to_goal
 
+_Choice = tuple[tuple[Edge, ...], int, int]  # path, node at its end, node behind the shortcut
+
 
 @dataclass(frozen=True)
 class Start:
@@ -103,11 +105,12 @@ def find_start(
     operator_path: OperatorPath | None,
     operator_steps: Mapping[str, float],
     beyond: bool = False,
+    rng: np.random.Generator | None = None,
 ) -> StartRecord | None:
     """The start of a shortcut of this signature in a task.
 
     Of all sources that the operators of ``operator_path`` lead to, it is the one from which the
-    shortcut gets nearest to the goal.
+    shortcut gets nearest to the goal, or one that is drawn.
 
     Args:
         domain: Domain of the task.
@@ -118,6 +121,8 @@ def find_start(
             for whatever operators lead to one, as few as can be.
         operator_steps: Mean environment steps of each operator, by name.
         beyond: Whether the shortcut leads to abstract states that operators alone do not reach.
+        rng: Generator that draws one of the sources from which the shortcut leads on; None for the
+            one that is nearest to the goal.
 
     Returns:
         The start; None where the task has none, or cannot be solved at all.
@@ -136,7 +141,10 @@ def find_start(
     if beyond:
         _extend(graph, SignatureGrounder(*about), problem, hold_option(domain.action_space))
     to_go = steps_to_goal(graph, operator_steps)
-    for path, i, j in _nearest_to_goal_first(graph, operator_path, matcher, to_go):
+    choices = _nearest_to_goal_first(graph, operator_path, matcher, to_go)
+    if rng is not None:
+        choices = _shuffled([c for c in choices if to_go[c[2]] < to_go[c[1]]], rng)
+    for path, i, j in choices:
         state = _execute(problem, graph, path, task.initial_state)
         if state is not None:
             change = Change.between(graph.nodes[i], graph.nodes[j])
@@ -167,12 +175,16 @@ def _made(option: Option) -> Option:
     return option
 
 
+def _shuffled(choices: Sequence[_Choice], rng: np.random.Generator) -> list[_Choice]:
+    return [choices[i] for i in rng.permutation(len(choices)).tolist()]
+
+
 def _nearest_to_goal_first(
     graph: AbstractGraph,
     operator_path: OperatorPath | None,
     matcher: SignatureMatcher,
     to_go: Sequence[float],
-) -> list[tuple[tuple[Edge, ...], int, int]]:
+) -> list[_Choice]:
     """Paths to where a shortcut may begin, with the nodes where it begins and ends."""
     choices = []
     paths = shortest_paths(graph) if operator_path is None else _paths(graph, operator_path)

@@ -9,6 +9,7 @@ themselves show that it can be done, and where the shortcut in their place is.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.signature import Change, Signature, context_of
+from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 from slap_ros.shortcuts.straightening import ChainExecutor, StraightenedExecution, Straightener
 
 Pair = tuple[Edge, Edge]
@@ -71,17 +73,38 @@ class StraightenedChains:
         Returns:
             The execution; None where a skill fails, or the shortcut lacks actions that they take.
         """
-        nodes = self._graph.nodes
         executor = ChainExecutor(self._domain, self._space, state)
-        commands = executor.commands(state, pair, nodes)
+        commands = executor.commands(state, pair, self._graph.nodes)
         self.steps += executor.steps
         if commands is None:
             return None
-        change = Change.between(nodes[node], nodes[pair[1].target])
-        context = context_of(nodes[node], learner_interface(self._domain).grasping, self._space)
-        signature = Signature.of(change, self._space, context)
+        signature, change = self._lifted(node, pair[1].target)
         encoder = ObservationEncoder(self._domain, self._space, signature, change)
         straightener = Straightener(self._domain, encoder, state)
         found = straightener.shorten(commands, tries, rng)
         self.steps += straightener.steps
         return found
+
+    def signature(self, node: int, target: int) -> Signature:
+        """The signature of the shortcut from a node to another one, which matches this change.
+
+        Where the same can be done with more objects, the whole of that would be the change that a
+        signature matches. Skills show it with one of them, so that it is counted.
+
+        Args:
+            node: Index of the node in which the shortcut begins.
+            target: Index of the node that it leads to.
+        """
+        signature, _ = self._lifted(node, target)
+        grasping = learner_interface(self._domain).grasping
+        matcher = SignatureMatcher(signature, self._space, grasping)
+        if target in matcher.targets(self._graph.nodes, node):
+            return signature
+        return replace(signature, counted=True)
+
+    def _lifted(self, node: int, target: int) -> tuple[Signature, Change]:
+        """The change from a node to another one, and the signature that it has by itself."""
+        nodes, grasping = self._graph.nodes, learner_interface(self._domain).grasping
+        change = Change.between(nodes[node], nodes[target])
+        context = context_of(nodes[node], grasping, self._space)
+        return Signature.of(change, self._space, context), change

@@ -26,6 +26,7 @@ from slap_ros.relational.state import Array
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 
 LONGEST, LATER = 0.7, 0.3  # share of an execution that is replaced at once: at first, and later
+SETTLING = 5  # environment steps for which the robot may hold at the end until nothing moves
 STRAIGHTENED = "straightened skills"  # in the records of what they found
 
 
@@ -108,6 +109,7 @@ class Straightener:
         self._encoder, self._start = encoder, start
         self._world = domain.model_world(start)
         self._targets = [encoder.change.apply(encoder.space.abstract(start))]
+        self._hold = np.asarray(domain.action_space.hold, dtype=np.float64)
         displacements = set(domain.learned_actions.displacement_indices)
         self._axes = [k for k, axis in enumerate(encoder.action_map.axes) if axis in displacements]
         self.steps = 0  # environment steps so far
@@ -126,7 +128,9 @@ class Straightener:
             The shortest execution; None where already the first misses the target, as one does
             that acts with a gripper which the shortcut has not.
         """
-        actions = self._encoder.action_map.inverse(commands)
+        # A skill may end while things still move, as in a drawer that shuts; a shortcut may not.
+        settling = np.repeat(self._hold[None], SETTLING, axis=0)
+        actions = self._encoder.action_map.inverse(np.concatenate([commands, settling]))
         best = self.execute(actions)
         for number in range(tries if best is not None else 0):
             assert best is not None

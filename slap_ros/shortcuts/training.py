@@ -90,6 +90,7 @@ class CandidateGroup:
             task; 0 where there was none.
         beyond: Whether a candidate leads to an abstract state that operators alone do not reach.
         found_by: Names of the exploration policies that found candidates.
+        replaced: Names of the skills that show it; none where something else found it.
     """
 
     signature: Signature
@@ -97,6 +98,7 @@ class CandidateGroup:
     savings: tuple[float, ...]
     beyond: bool = False
     found_by: tuple[str, ...] = (RANDOM,)
+    replaced: OperatorPath = ()
 
     @property
     def tasks(self) -> int:
@@ -111,13 +113,25 @@ class CandidateGroup:
     def saving_beside(self, others: Sequence[CandidateGroup]) -> float:
         """The expected saving beyond the best of others in each task, mean over tasks.
 
+        What is in the place of skills that come before or after adds to it instead.
+
         Args:
             others: Groups that are learned already.
         """
+        rivals = [o for o in others if not (self.comes_after(o) or o.comes_after(self))]
         return fmean(
             max(0.0, own - max(best, default=0.0))
-            for own, *best in zip(self.savings, *(other.savings for other in others), strict=True)
+            for own, *best in zip(self.savings, *(other.savings for other in rivals), strict=True)
         )
+
+    def comes_after(self, other: CandidateGroup) -> bool:
+        """Whether it begins where the skills that show another one have ended, or later.
+
+        Args:
+            other: Candidates of another learning problem.
+        """
+        until = (*other.operator_path, *other.replaced)
+        return bool(other.replaced) and self.operator_path[: len(until)] == until
 
 
 ProblemKey = tuple[frozenset[Pattern], frozenset[str]]  # equal for equal learning problems
@@ -141,6 +155,7 @@ def rank(explored: Sequence[ExplorationResult]) -> list[CandidateGroup]:
             tuple(_saving(group.get(task)) for task in range(len(explored))),
             any(candidate.beyond for candidate in group.values()),
             tuple(dict.fromkeys(name for c in group.values() for name in c.found_by)),
+            next((c.replaced for c in group.values() if c.replaced), ()),
         )
         for (_, operator_path), group in groups.items()
     ]
@@ -364,7 +379,8 @@ class Training:
     def _starts(
         self, group: CandidateGroup, operator_steps: Mapping[str, float]
     ) -> tuple[StartRecord, ...]:
-        name = group.signature.name
+        name, cloning = group.signature.name, self.settings.cloning
+        anywhere = cloning is not None and cloning.anywhere
         work = [
             (
                 self.distribution,
@@ -373,6 +389,7 @@ class Training:
                 group.operator_path,
                 operator_steps,
                 group.beyond,
+                anywhere,
             )
             for i in range(self.settings.starts)
         ]

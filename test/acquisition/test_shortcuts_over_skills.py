@@ -536,14 +536,24 @@ def test_libraries_that_ship_together_are_those_that_were_evaluated(name):
     assert evaluated["library"]["digest"] == library.digest
 
 
-def test_the_library_that_two_skills_show_is_the_one_that_was_evaluated():
+@pytest.mark.parametrize("name", ["peg_in_hole", "stow_hammer"])
+def test_the_library_that_two_skills_show_is_the_one_that_was_evaluated(name):
     models = Path(__file__).parents[2] / "models"
-    skills = str(models / "skills" / "peg_in_hole")
-    bench = open_domain(DomainChoice("peg_in_hole", "fair", skills))
-    evaluated = json.loads((models / "chains" / "peg_in_hole" / "evaluation.json").read_text())
+    bench = open_domain(DomainChoice(name, "fair", str(models / "skills" / name)))
+    evaluated = json.loads((models / "chains" / name / "evaluation.json").read_text())
     assert evaluated["skills"]["digest"] == bench.configuration["skills_digest"]
-    library = chosen_library(str(models / "chains" / "peg_in_hole" / "shortcuts"), bench)
+    library = chosen_library(str(models / "chains" / name / "shortcuts"), bench)
     assert evaluated["library"]["digest"] == library.digest
+
+
+def test_what_two_skills_show_shortens_a_plan_that_a_fresh_world_confirms():
+    models = Path(__file__).parents[2] / "models"
+    bench = open_domain(DomainChoice("stow_hammer", "fair", str(models / "skills/stow_hammer")))
+    library = chosen_library(str(models / "chains" / "stow_hammer" / "shortcuts"), bench)
+    alone, one_sample, _ = approaches(library, DEFAULT)
+    before, after = (solve(bench, bench.task(300), each, "lazy") for each in (alone, one_sample))
+    assert before.success and after.success
+    assert after.plan_length < 0.9 * before.plan_length
 
 
 @pytest.mark.slow

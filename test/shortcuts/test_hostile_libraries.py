@@ -82,6 +82,7 @@ def with_value(path, value):
         (with_value("shortest", 0), "shortest"),
         (with_value("shortest", 10**400), "damaged"),
         (with_value("shortest", 1e308), "shortest"),
+        (with_value("horizon", 0), "tried out"),
         (with_value("record", [1]), "damaged"),
     ],
 )

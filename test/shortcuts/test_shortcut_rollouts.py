@@ -15,7 +15,7 @@ from slap_ros.relational import Target
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.sampling import DEFAULT, Sampling
 from slap_ros.shortcuts.shooting import RandomActions
-from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.shortcuts.shortcut_library import load_library, load_shortcut, save_shortcut
 from slap_ros.shortcuts.shortcut_rollouts import MAX_NET_FAILURES, ShortcutRollouts
 from slap_ros.shortcuts.signature import Change
 
@@ -155,3 +155,20 @@ def test_a_batch_finds_a_way_at_least_as_short():
         for sampling in (few, many)
     ]
     assert sums[1] < sums[0]
+
+
+def test_a_shortcut_that_takes_longer_is_tried_out_for_longer(tmp_path):
+    encoder, state = next(situations())
+    short = replace(DEFAULT, horizon=1)
+    assert not successes(DOMAIN, short, encoder, state)
+    longer = replace(SHORTCUT, horizon=DEFAULT.horizon)
+    found = ShortcutRollouts(DOMAIN, state, short).successes(longer, encoder, state)
+    assert [rollout.steps for rollout in found] == [
+        rollout.steps for rollout in successes(DOMAIN, DEFAULT, encoder, state)
+    ]
+    assert longer.step_limit(replace(DEFAULT, horizon=100)) == 100
+    for shortcut in (SHORTCUT, longer):
+        save_shortcut(tmp_path / shortcut.name, shortcut)
+        assert load_shortcut(tmp_path / shortcut.name).horizon == shortcut.horizon
+        text = (tmp_path / shortcut.name / "shortcut.json").read_text()
+        assert ('"horizon"' in text) == (shortcut is longer)

@@ -12,14 +12,17 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers, local_workers
 from slap_ros.planning.abstract_graph import build_abstract_graph
+from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.shortcuts.demonstrations import ShortcutDemonstration, demonstrate, demonstrated
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.settings import CHAINS, ExplorationSettings, training_settings
+from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 from slap_ros.shortcuts.starts import find_start
 from slap_ros.shortcuts.straightened_chains import StraightenedChains
-from slap_ros.shortcuts.straightening import STRAIGHTENED, straight
+from slap_ros.shortcuts.straightening import SETTLING, STRAIGHTENED, ChainExecutor, straight
 from slap_ros.shortcuts.training import Training
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
@@ -112,6 +115,78 @@ def test_a_shortcut_without_gripper_is_not_shown_by_skills_that_need_it(pegs):
     assert pairs
     rng = np.random.default_rng(0)
     assert all(chains.straighten(task.initial_state, 0, pair, 1, rng) is None for pair in pairs)
+
+
+@pytest.fixture(scope="module")
+def stowing():
+    """A task with two hammers and two drawers, after Open and Pick."""
+    hammers = open_domain(DomainChoice("stow_hammer", "fair", "models/skills/stow_hammer"))
+    task = hammers.task(SEED, 0)
+    problem = Problem.of(hammers, task.initial_state)
+    space = problem.model.space
+    graph = build_abstract_graph(
+        space.abstract(task.initial_state), space.mask(task.goal), problem.operators
+    )
+    plan = GraphPlanner(problem).plan(task.initial_state, graph.goal).plan
+    state, node, forward = task.initial_state, 0, graph.forward_edges()
+    edges = []
+    for planned in plan.edges[:4]:
+        edges.append(next(e for e in forward[node] if str(e.option) == str(planned.option)))
+        node = edges[-1].target
+    for edge in edges[:2]:
+        target = edge.option.target(graph.nodes[edge.target])
+        state = problem.model.roll_out(edge.option, state, target).final
+    chains = StraightenedChains(hammers, problem, graph)
+    return hammers, space, graph, chains, state, edges
+
+
+def test_an_execution_that_ends_in_motion_goes_on_until_nothing_moves(stowing):
+    hammers, space, graph, chains, state, (_, pick, place, close) = stowing
+    assert (place.option.skill.name, close.option.skill.name) == ("Place", "Close")
+    executor = ChainExecutor(hammers, space, state)
+    commands = executor.commands(state, (place, close), graph.nodes)
+    world = hammers.model_world(state)
+    for command in commands:
+        last = world.step(command)
+    at_rest = hammers.learning.interface.at_rest
+    assert not at_rest(last.alone())[0]  # the drawer with the hammer still slides
+    found = chains.straighten(state, pick.target, (place, close), 0, np.random.default_rng(0))
+    assert len(commands) < found.steps <= len(commands) + SETTLING
+    assert not found.actions[len(commands) :].any()
+    assert at_rest(found.states[-1].alone())[0]
+
+
+def test_what_skills_show_with_one_object_is_not_asked_for_with_all_at_once(stowing):
+    hammers, space, graph, chains, _, (_, pick, _, close) = stowing
+    signature = chains.signature(pick.target, close.target)
+    assert signature.counted
+    assert Signature.from_json(signature.as_json()) == signature
+    at_large = replace(signature, counted=False)
+    assert at_large.name != signature.name
+    grasping = hammers.learning.interface.grasping
+
+    def targets(sought):
+        return SignatureMatcher(sought, space, grasping).targets(graph.nodes, pick.target)
+
+    assert close.target in targets(signature)
+    assert close.target not in targets(at_large)  # only both hammers in both drawers
+    both = Change.between(graph.nodes[pick.target], graph.nodes[targets(at_large)[0]])
+    assert at_large.matches(both, graph.nodes[pick.target], space)
+    assert not signature.matches(both, graph.nodes[pick.target], space)
+    assert not chains.signature(0, pick.target).counted  # a hand holds one hammer anyway
+    assert "counted" not in chains.signature(0, pick.target).as_json()
+
+
+def test_starts_are_drawn_from_wherever_the_shortcut_leads_on(stowing):
+    hammers, _, _, chains, _, (_, pick, *_) = stowing
+    signature, steps = chains.signature(0, pick.target), {"Open": 40, "Pick": 40}
+    records = [
+        find_start(hammers, SEED, TASK, signature, None, steps, False, np.random.default_rng(i))
+        for i in range(4)
+    ]
+    again = find_start(hammers, SEED, TASK, signature, None, steps, False, np.random.default_rng(0))
+    assert again == records[0]
+    assert len({record.add for record in records}) > 1  # other hammers, other drawers
 
 
 class Recorder:

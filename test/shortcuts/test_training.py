@@ -317,3 +317,18 @@ def test_what_serves_other_tasks_is_worth_learning_beside_what_saves_more():
     assert same_tasks.saving_beside([most]) == 0.0
     assert other_tasks.saving_beside([most]) == pytest.approx(0.05)
     assert most.saving_beside([same_tasks, other_tasks]) == pytest.approx(0.025)
+
+
+def test_what_replaces_later_skills_adds_to_what_replaces_earlier_ones():
+    def group(name, operator_path, replaced=()):
+        return CandidateGroup(
+            candidate(name, 0.0).signature, operator_path, (0.2, 0.1), replaced=replaced
+        )
+
+    first = group("A", (), ("Open", "Pick"))
+    after = group("B", ("Open", "Pick"), ("Place", "Close"))
+    overlapping = group("C", ("Open",), ("Pick", "Place"))
+    random = group("D", ("Open", "Pick"))
+    assert after.saving_beside([first]) == first.saving_beside([after]) == pytest.approx(0.15)
+    assert overlapping.saving_beside([first]) == after.saving_beside([overlapping]) == 0.0
+    assert random.saving_beside([after]) == 0.0  # nobody knows what random actions replace

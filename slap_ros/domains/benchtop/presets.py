@@ -5,13 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
-from slap_ros.core import Acquisition, Domain, Execution, Goal, Learning, Task
+from slap_ros.core import (
+    Acquisition,
+    Domain,
+    Execution,
+    Goal,
+    Learning,
+    SettingValue,
+    Task,
+)
 from slap_ros.domains.benchtop.learner_interface import learner_interface
 from slap_ros.domains.benchtop.metrics import COMMON
 from slap_ros.domains.benchtop.primitives import PRIMITIVES
@@ -66,6 +74,8 @@ class BenchtopModel:
         metrics: Metrics besides those that every domain has and those that predicates use.
         static: Predicates that nothing changes.
         view: Viewpoint of animations.
+        chains: Training settings where two skills in a row show a shortcut (``ours_chains``), where
+            they differ from the usual ones.
     """
 
     types: tuple[Type, ...]
@@ -77,6 +87,7 @@ class BenchtopModel:
     metrics: tuple[Metric, ...] = ()
     static: frozenset[Predicate] = frozenset()
     view: Viewpoint = VIEW
+    chains: Mapping[str, SettingValue] = field(default_factory=dict)
 
 
 def benchtop_domain(
@@ -121,7 +132,7 @@ def benchtop_domain(
         robot_types=frozenset({ROBOT}),
         learning=Learning(
             interface=learner_interface(model.holding, scene_of),
-            settings={"ours_near": NEAR_SETTINGS},
+            settings={"ours_near": NEAR_SETTINGS, "ours_chains": model.chains},
         ),
         acquisition=replace(model.acquisition, primitives=PRIMITIVES),
         configuration=settings.as_configuration(),

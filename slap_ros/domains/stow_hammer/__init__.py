@@ -24,6 +24,20 @@ SETTINGS = {
     "fair": StowTasks(),
     "paper": StowTasks(front_x=(0.47, 0.47), front_y=(0.355, 0.355), front_turn=(0.0, 0.0)),
 }
+# Two skills take 80 environment steps, and the same is done at one cabinet and then at the other.
+# With four samples, planning for one task of validation takes most of a minute.
+CHAINS = {
+    "cloning.anywhere": True,
+    "cloning.horizon": 80,
+    "cloning.straightened": 80,
+    "exploration.nodes": 9,
+    "exploration.tasks": 2,
+    "horizon": 90,
+    "sampling.refinements": 0,
+    "sampling.samples": 1,
+    "starts": 120,
+    "validation": 4,
+}
 MODEL = BenchtopModel(
     types=model.TYPES,
     predicates=model.PREDICATES,
@@ -41,6 +55,7 @@ MODEL = BenchtopModel(
     ),
     scene_of=scene_of,
     metrics=drawers.METRICS,
+    chains=CHAINS,
 )
 
 
