@@ -18,9 +18,11 @@ The effort is limited in roll-outs and abstract states, never in seconds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph
@@ -28,11 +30,13 @@ from slap_ros.planning.corridor import CorridorBuilder
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.ff_planner import FFPlanner
 from slap_ros.planning.graph_planner import GraphPlanner
-from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
+from slap_ros.planning.implicit_search import ImplicitSearch
+from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.lazy_search import LookAhead, SearchLimits, search_lazily
 from slap_ros.planning.model import CountedModel
 from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.planning.planner_choice import ANYTIME
+from slap_ros.planning.potential import LeastSteps
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import SearchOutcome
 from slap_ros.planning.shortcut_source import ShortcutSource
@@ -193,6 +197,7 @@ class _Improvement:
         """
         with suppress(PlanningLimitError):  # a shortcut may still do what operators cannot
             first = self._find_first()
+            self._prove(0)
             yield self._result(None, first.graph_nodes, first.graph_edges)
         self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
         yield from self._around(abstract)
@@ -211,6 +216,8 @@ class _Improvement:
             for weight in WEIGHTS:
                 if self._take(self._search(graph, ahead, weight).plan):
                     yield self._result(graph)
+            if self._prove(self._planner.effort.rollouts // NEAR_PLANS):
+                yield self._result(graph)
             if self._best in (None, searched) or self._model.executed >= self._limit:
                 return
             searched, route = self._best, [abstract, *self._on_the_way()]
@@ -224,7 +231,7 @@ class _Improvement:
         if self._no_first is not None:
             raise self._no_first
         abstract = self._model.space.abstract(self._state)
-        self._at_least = max(self._at_least, self._least_steps(abstract))
+        self._at_least = max(self._at_least, self._least_steps(abstract) or 0)
         try:
             first = FFPlanner(self._problem).plan(self._state, self._goal)
         except (UnsolvableError, PlanningLimitError) as error:
@@ -273,15 +280,48 @@ class _Improvement:
     def _is_proven(self) -> bool:
         return self._best is not None and self._at_least >= self._best.predicted_steps
 
-    def _least_steps(self, abstract: int) -> int:
-        """Steps of any plan, by landmarks of operators and shortcuts."""
+    def _prove(self, rollouts: int) -> bool:
+        """Raise what is proven of any plan, until the best one is good enough; whether it rose.
+
+        Args:
+            rollouts: Number of roll-outs for all proofs, besides those of searches for plans.
+        """
+        if self._best is None:
+            return False
+        enough = math.ceil(self._best.predicted_steps / self._planner.effort.within)
+        before = self._at_least
+        self._at_least = max(before, self._proof.at_least(rollouts, enough))
+        return self._at_least > before
+
+    @cached_property
+    def _proof(self) -> ImplicitSearch:
+        """The search for what can be proven, on a model that counts for itself."""
+        problem, shortcuts = self._planner.problem, self._planner.shortcuts
+        search = ImplicitSearch(
+            CountedModel(problem.model),
+            problem.operators,
+            self._goal,
+            self._least_steps,
+            shortcuts.may_begin if shortcuts is not None else _never,
+        )
+        search.begin(self._state)
+        return search
+
+    @cached_property
+    def _least_steps(self) -> LeastSteps:
+        """Steps of any plan from an abstract state, by landmarks of operators and shortcuts."""
         operators = [
-            RelaxedOperator(ground.preconditions, ground.add_effects, option.skill.least_steps)
+            RelaxedOperator(
+                ground.preconditions,
+                ground.add_effects,
+                option.skill.least_steps,
+                ground.delete_effects,
+            )
             for ground, option in self._problem.operators
         ]
         if self._planner.shortcuts is not None:
             operators += self._planner.shortcuts.relaxed()
-        return LandmarkCut(self._goal, operators)(abstract) or 0
+        return LeastSteps(self._goal, operators)
 
     def _result(
         self, graph: AbstractGraph | None, nodes: int = 0, edges: int = 0
@@ -294,3 +334,8 @@ class _Improvement:
 
 def _nothing() -> None:
     """Nothing has failed."""
+
+
+def _never(_: int) -> bool:
+    """No shortcut begins where there are none."""
+    return False

@@ -21,11 +21,20 @@ _INFINITE = 1 << 60
 
 @dataclass(frozen=True)
 class RelaxedOperator:
-    """What an option may need and add, and the environment steps that it takes at least."""
+    """What an option may need and add, and the environment steps that it takes at least.
+
+    Args:
+        preconditions: Atoms that must hold, a mask.
+        add_effects: Atoms that it may add, a mask.
+        least_steps: Environment steps that it takes at least.
+        deletes: Atoms that it deletes, a mask, if exactly its effects come of it; None where it may
+            add less and delete anything. LM-cut does not need it.
+    """
 
     preconditions: int
     add_effects: int
     least_steps: int
+    deletes: int | None = None
 
 
 class LandmarkCut:
