@@ -36,7 +36,7 @@ from slap_ros.planning.lazy_search import LookAhead, SearchLimits, search_lazily
 from slap_ros.planning.model import CountedModel
 from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.planning.planner_choice import ANYTIME
-from slap_ros.planning.potential import LeastSteps
+from slap_ros.planning.potential import LeastSteps, alternate
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import SearchOutcome
 from slap_ros.planning.shortcut_source import ShortcutSource
@@ -148,6 +148,7 @@ class _Improvement:
         self._limit = planner.effort.rollouts
         self._best: Plan | None = None
         self._no_first: PlanningLimitError | None = None  # why FF found no plan
+        self._first_options = 0  # of the plan that FF found
         self._at_least = 0  # environment steps of any plan
         shortcuts = planner.shortcuts
         self._forget_failures = shortcuts.forget_failures_since_now() if shortcuts else _nothing
@@ -240,6 +241,7 @@ class _Improvement:
                 f"{error}"
             )
             raise self._no_first from error
+        self._first_options = len(first.plan.edges)
         self._take(first.plan)
         return first
 
@@ -301,16 +303,50 @@ class _Improvement:
             CountedModel(problem.model),
             problem.operators,
             self._goal,
-            self._least_steps,
+            self._steps_to_come,
             shortcuts.may_begin if shortcuts is not None else _never,
         )
         search.begin(self._state)
         return search
 
+    def _steps_to_come(self, abstract: int, options: int) -> int | None:
+        """See :class:`ImplicitSearch`."""
+        if self._options is not None:
+            fewest = self._fewest_options(abstract)
+            if fewest is None or options + fewest > self._options:
+                return None
+        return self._least_steps(abstract)
+
+    @cached_property
+    def _options(self) -> int | None:
+        """The number of options of each plan through the graph; None where that is not known.
+
+        Where each option changes whether one atom holds, layers of the graph alternate in it, so
+        that each forward edge leads to the next layer. The goal is in the last one.
+        """
+        abstract = self._model.space.abstract(self._state)
+        grounds = [ground for ground, _ in self._problem.operators]
+        if self._planner.shortcuts is not None or not alternate(grounds, abstract):
+            return None
+        fewest = self._fewest_options(abstract)
+        return fewest if fewest == self._first_options else None
+
+    @cached_property
+    def _fewest_options(self) -> LeastSteps:
+        """The number of options from an abstract state to the goal at least."""
+        return LeastSteps(self._goal, [replace(o, least_steps=1) for o in self._relaxed()])
+
     @cached_property
     def _least_steps(self) -> LeastSteps:
         """Steps of any plan from an abstract state, by landmarks of operators and shortcuts."""
-        operators = [
+        shortcuts = self._planner.shortcuts
+        return LeastSteps(
+            self._goal, [*self._relaxed(), *(shortcuts.relaxed() if shortcuts else [])]
+        )
+
+    def _relaxed(self) -> list[RelaxedOperator]:
+        """The operators with the least steps of their skills."""
+        return [
             RelaxedOperator(
                 ground.preconditions,
                 ground.add_effects,
@@ -319,9 +355,6 @@ class _Improvement:
             )
             for ground, option in self._problem.operators
         ]
-        if self._planner.shortcuts is not None:
-            operators += self._planner.shortcuts.relaxed()
-        return LeastSteps(self._goal, operators)
 
     def _result(
         self, graph: AbstractGraph | None, nodes: int = 0, edges: int = 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A* through an abstract graph that is never made: for what it proves, where the graph is too large.
+"""A* through an abstract graph that is never made, for what it proves where that is too large.
 
 The options that are applicable in a vertex wait in the queue, each with the bound of its skill from
 the low-level state and the least steps from where it leads; one is rolled out when it is the best.
@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import count
+from typing import Any
 
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import Option
@@ -32,6 +33,7 @@ class _Entry:
     f: int  # environment steps of any plan through it, at least
     minus_g: int  # of equal ones, the one that is farther first
     turn: int
+    options: int = field(compare=False)  # from the start to where it leads
     abstract: int = field(compare=False)  # where it leads, a mask
     state: State = field(compare=False)  # of the vertex
     option: Option | None = field(compare=False, default=None)
@@ -46,7 +48,7 @@ class ImplicitSearch:
         model: Model,
         operators: GroundedOptions,
         goal: int,
-        least_steps: Callable[[int], int | None],
+        steps_to_come: Callable[[int, int], int | None],
         shortcuts_may_begin: Callable[[int], bool],
     ) -> None:
         """Prepare the search.
@@ -55,13 +57,14 @@ class ImplicitSearch:
             model: Model that rolls options out.
             operators: Operators with their options.
             goal: Mask of atoms that must hold.
-            least_steps: Function from an abstract state to environment steps to the goal at least,
-                shortcuts included; None where the goal is out of reach.
+            steps_to_come: Function from an abstract state, and the number of options before it, to
+                environment steps to the goal at least, shortcuts included; None where no plan is
+                through it.
             shortcuts_may_begin: Function that says whether a shortcut may begin in an abstract
                 state.
         """
         self._model, self._operators, self._goal = model, operators, goal
-        self._least_steps = cache(least_steps)
+        self._steps_to_come = cache(steps_to_come)
         self._shortcuts_may_begin = shortcuts_may_begin
         self._queue: list[_Entry] = []
         self._turns = count()
@@ -73,7 +76,8 @@ class ImplicitSearch:
         Args:
             state: Low-level state to start from.
         """
-        self._put(0, 0, self._model.space.abstract(state), state)
+        abstract = self._model.space.abstract(state)
+        heapq.heappush(self._queue, _Entry(0, 0, next(self._turns), 0, abstract, state))
 
     def at_least(self, rollouts: int, enough: int) -> int:
         """Environment steps that every plan takes.
@@ -98,34 +102,30 @@ class ImplicitSearch:
                 break
         return self._proven
 
-    def _put(
-        self, f: int, g: int, abstract: int, state: State, option: Option | None = None
-    ) -> None:
-        heapq.heappush(self._queue, _Entry(f, -g, next(self._turns), abstract, state, option))
-
     def _expand(self, vertex: _Entry) -> None:
         """Queue what can be done in a vertex, each option with its bound."""
-        g, state, abstract = -vertex.minus_g, vertex.state, vertex.abstract
-        if self._shortcuts_may_begin(abstract):
-            f = max(vertex.f, g + (self._least_steps(abstract) or 0))
-            heapq.heappush(
-                self._queue, _Entry(f, -g, next(self._turns), abstract, state, is_open=True)
-            )
+        if self._shortcuts_may_begin(vertex.abstract):
+            to_come = self._steps_to_come(vertex.abstract, vertex.options) or 0
+            self._put_after(vertex, to_come - vertex.minus_g, is_open=True)
         for ground, option in self._operators:
-            if not ground.applicable(abstract):
+            if not ground.applicable(vertex.abstract):
                 continue
-            reached = ground.apply(abstract)
-            to_come = self._least_steps(reached)
+            reached, options = ground.apply(vertex.abstract), vertex.options + 1
+            to_come = self._steps_to_come(reached, options)
             if to_come is not None:
-                bound = option.skill.lower_bound(state, option.objects)
-                f = g + max(bound, option.skill.least_steps) + to_come
-                self._put(max(vertex.f, f), g, reached, state, option)
+                bound = option.skill.lower_bound(vertex.state, option.objects)
+                f = max(bound, option.skill.least_steps) + to_come - vertex.minus_g
+                self._put_after(vertex, f, abstract=reached, options=options, option=option)
 
     def _roll_out(self, entry: _Entry, option: Option) -> None:
         """Queue where an option leads; where it fails, no plan is through it."""
-        g, to_come = -entry.minus_g, self._least_steps(entry.abstract) or 0
         rollout = self._model.roll_out(option, entry.state, option.target(entry.abstract))
-        if not rollout.reached:
-            return
-        f = max(entry.f, g + rollout.steps + to_come)
-        self._put(f, g + rollout.steps, entry.abstract, rollout.final)
+        if rollout.reached:
+            minus_g = entry.minus_g - rollout.steps
+            f = (self._steps_to_come(entry.abstract, entry.options) or 0) - minus_g
+            self._put_after(entry, f, minus_g=minus_g, state=rollout.final, option=None)
+
+    def _put_after(self, entry: _Entry, f: int, **changes: Any) -> None:
+        """Queue what comes of an entry; what was proven of that holds for it as well."""
+        turn = next(self._turns)
+        heapq.heappush(self._queue, replace(entry, f=max(f, entry.f), turn=turn, **changes))

@@ -18,7 +18,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
+from slap_ros.planning.mutexes import may_hold_together
 from slap_ros.planning.relaxation import bits
+from slap_ros.relational import GroundOperator
 
 
 class LeastSteps:
@@ -32,7 +34,7 @@ class LeastSteps:
             operators: Relaxed operators, each of which costs something.
         """
         self._plain = LandmarkCut(goal, operators)
-        self._atom = _contested(operators)
+        self._atom = contested(operators)
         self._weight = min((o.least_steps for o in operators if self._may_add(o)), default=0)
         self._shifted: LandmarkCut | None = None
         if self._weight:
@@ -77,7 +79,31 @@ def _takes(operator: RelaxedOperator) -> int:
     return operator.preconditions & (operator.deletes or 0) & ~operator.add_effects
 
 
-def _contested(operators: Sequence[RelaxedOperator]) -> int:
+def contested(operators: Sequence[RelaxedOperator]) -> int:
     """The atom that most operators need and delete, the first of several, as a mask; 0: none."""
     taken = Counter(bit for one in operators for bit in bits(_takes(one)))
     return 1 << min(taken, key=lambda bit: (-taken[bit], bit)) if taken else 0
+
+
+def alternate(operators: Sequence[GroundOperator], start: int) -> bool:
+    """Whether each operator changes whether the atom holds that most of them need and delete.
+
+    Args:
+        operators: Ground operators over one atom space.
+        start: Abstract state from which they are applied, a mask.
+    """
+    relaxed = [
+        RelaxedOperator(one.preconditions, one.add_effects, 1, one.delete_effects)
+        for one in operators
+    ]
+    atom = contested(relaxed)
+    together = may_hold_together(start, operators)
+
+    def switches(one: RelaxedOperator) -> bool:
+        if _takes(one) & atom:
+            return True
+        needed = bits(one.preconditions)
+        needs_it_not = any(not together.get(bit, 0) & atom for bit in needed)
+        return bool(one.add_effects & atom) and needs_it_not
+
+    return all(map(switches, relaxed))
