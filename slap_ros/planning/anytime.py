@@ -11,7 +11,9 @@ weight, is the search of ``lazy``, and finds a plan of the same cost.
 
 Where there are too many abstract states, the graph near the best plan is searched
 (:mod:`slap_ros.planning.corridor`), shortcuts included, until that finds nothing shorter. Such a
-graph is another one for each plan, so that less effort goes into it.
+graph is another one for each plan, so that less effort goes into it. It proves nothing of other
+plans: what is proven comes from landmarks (:mod:`slap_ros.planning.potential`), and from a search
+that begins in the start (:mod:`slap_ros.planning.implicit_search`).
 
 The effort is limited in roll-outs and abstract states, never in seconds.
 """
@@ -22,7 +24,8 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import or_
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph
@@ -44,6 +47,7 @@ from slap_ros.relational import State
 
 SMALL = 150  # abstract states of a graph in which nothing is gained by a first plan
 NEAR_PLANS = 4  # roll-outs of a whole graph to one of graphs near plans
+PROOFS = 2  # roll-outs of a whole graph to one of proofs, where the graph is too large
 WEIGHTS = (30.0, 3.0, 1.0)  # of bounds of what is to come, one search after the other
 SOON = 20  # roll-outs of a first search without a weight: where shortcuts are good, it ends by then
 SEARCHES = ((1.0, SOON), *((weight, None) for weight in WEIGHTS))  # of a whole graph: roll-outs
@@ -217,7 +221,7 @@ class _Improvement:
             for weight in WEIGHTS:
                 if self._take(self._search(graph, ahead, weight).plan):
                     yield self._result(graph)
-            if self._prove(self._planner.effort.rollouts // NEAR_PLANS):
+            if self._prove(self._planner.effort.rollouts // PROOFS):
                 yield self._result(graph)
             if self._best in (None, searched) or self._model.executed >= self._limit:
                 return
@@ -345,10 +349,13 @@ class _Improvement:
         )
 
     def _relaxed(self) -> list[RelaxedOperator]:
-        """The operators with the least steps of their skills."""
+        """The operators with the least steps of their skills, without what always holds."""
+        grounds = [ground for ground, _ in self._problem.operators]
+        changing = reduce(or_, (one.add_effects | one.delete_effects for one in grounds), 0)
+        always = self._model.space.abstract(self._state) & ~changing
         return [
             RelaxedOperator(
-                ground.preconditions,
+                ground.preconditions & ~always,
                 ground.add_effects,
                 option.skill.least_steps,
                 ground.delete_effects,

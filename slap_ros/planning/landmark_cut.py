@@ -13,6 +13,8 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 
 from slap_ros.planning.relaxation import bits
 
@@ -50,6 +52,7 @@ class LandmarkCut:
         masks = [goal, *(o.preconditions | o.add_effects for o in operators)]
         size = max(mask.bit_length() for mask in masks)
         self._start, self._goal = size, size + 1
+        self._needed = reduce(or_, [goal, *(o.preconditions for o in operators)])
         self._needs = [bits(o.preconditions) or [self._start] for o in operators]
         self._needs.append(bits(goal) or [self._start])
         self._adds = [bits(o.add_effects & ~o.preconditions) for o in operators]
@@ -64,8 +67,7 @@ class LandmarkCut:
         Args:
             abstract: Abstract state to start from, a mask.
         """
-        known = self._goal - 1
-        start = [*(bit for bit in bits(abstract) if bit < known), self._start]
+        start = [*bits(abstract & self._needed), self._start]
         costs, total = list(self._costs), 0
         while True:
             value, supporter = self._h_max(start, costs)

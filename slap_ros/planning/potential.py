@@ -33,15 +33,13 @@ class LeastSteps:
             goal: Mask of atoms that must hold.
             operators: Relaxed operators, each of which costs something.
         """
-        self._plain = LandmarkCut(goal, operators)
-        self._atom = contested(operators)
+        self._goal, self._atom = goal, contested(operators)
         self._weight = min((o.least_steps for o in operators if self._may_add(o)), default=0)
-        self._shifted: LandmarkCut | None = None
-        if self._weight:
-            self._shifted = LandmarkCut(goal, [self._shift(one) for one in operators])
+        self._shifted = LandmarkCut(goal, [self._shift(one) for one in operators])
         # The last operator of a shortest plan adds an atom of the goal.
         last = [one for one in operators if one.add_effects & goal]
         self._owed_at_end = 0 if all(map(self._leaves, last)) else self._weight
+        self._plain = LandmarkCut(goal, operators) if self._owed_at_end else None
 
     def __call__(self, abstract: int) -> int | None:
         """Environment steps to the goal at least; None where it is out of reach.
@@ -49,11 +47,14 @@ class LeastSteps:
         Args:
             abstract: Abstract state to start from, a mask.
         """
-        plain = self._plain(abstract)
-        if not plain or self._shifted is None:
-            return plain
+        if abstract & self._goal == self._goal:
+            return 0
+        shifted = self._shifted(abstract)
+        if shifted is None:
+            return None
         owed = 0 if abstract & self._atom else self._weight
-        return max(plain, (self._shifted(abstract) or 0) + owed - self._owed_at_end)
+        plain = self._plain(abstract) if self._plain is not None else None
+        return max(plain or 0, shifted + owed - self._owed_at_end)
 
     def _may_add(self, operator: RelaxedOperator) -> bool:
         return bool(operator.add_effects & self._atom)
