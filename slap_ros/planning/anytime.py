@@ -47,7 +47,9 @@ from slap_ros.relational import State
 
 SMALL = 150  # abstract states of a graph in which nothing is gained by a first plan
 NEAR_PLANS = 4  # roll-outs of a whole graph to one of graphs near plans
-PROOFS = 2  # roll-outs of a whole graph to one of proofs, where the graph is too large
+PROOFS = (
+    2  # roll-outs, and abstract states, of a whole graph to one of proofs where it is too large
+)
 WEIGHTS = (30.0, 3.0, 1.0)  # of bounds of what is to come, one search after the other
 SOON = 20  # roll-outs of a first search without a weight: where shortcuts are good, it ends by then
 SEARCHES = ((1.0, SOON), *((weight, None) for weight in WEIGHTS))  # of a whole graph: roll-outs
@@ -309,6 +311,7 @@ class _Improvement:
             self._goal,
             self._steps_to_come,
             shortcuts.may_begin if shortcuts is not None else _never,
+            self._planner._most_abstract_states // PROOFS,
         )
         search.begin(self._state)
         return search

@@ -50,6 +50,7 @@ class ImplicitSearch:
         goal: int,
         steps_to_come: Callable[[int, int], int | None],
         shortcuts_may_begin: Callable[[int], bool],
+        most_states: int,
     ) -> None:
         """Prepare the search.
 
@@ -62,13 +63,19 @@ class ImplicitSearch:
                 through it.
             shortcuts_may_begin: Function that says whether a shortcut may begin in an abstract
                 state.
+            most_states: Largest number of abstract states, each with the options before it, of
+                which the search asks what is to come.
         """
         self._model, self._operators, self._goal = model, operators, goal
         self._steps_to_come = cache(steps_to_come)
-        self._shortcuts_may_begin = shortcuts_may_begin
+        self._shortcuts_may_begin, self._most_states = shortcuts_may_begin, most_states
         self._queue: list[_Entry] = []
         self._turns = count()
         self._proven = 0
+
+    @property
+    def _asked(self) -> int:
+        return self._steps_to_come.cache_info().misses
 
     def begin(self, state: State) -> None:
         """Put the start into the queue.
@@ -92,12 +99,10 @@ class ImplicitSearch:
             is_goal = best.option is None and best.abstract & self._goal == self._goal
             if is_goal or best.is_open or best.f >= enough:
                 break
-            if best.option is None:
-                heapq.heappop(self._queue)
-                self._expand(best)
-            elif self._model.executed < rollouts:
-                heapq.heappop(self._queue)
-                self._roll_out(best, best.option)
+            if best.option is None and self._asked < self._most_states:
+                self._expand(heapq.heappop(self._queue))
+            elif best.option is not None and self._model.executed < rollouts:
+                self._roll_out(heapq.heappop(self._queue), best.option)
             else:
                 break
         return self._proven

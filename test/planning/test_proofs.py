@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slap_ros.domains import get_domain
+from slap_ros.errors import PlanningLimitError
 from slap_ros.planning import anytime
 from slap_ros.planning.anytime import AnytimePlanner
-from slap_ros.planning.effort import Effort
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
 from slap_ros.planning.options import Option, OptionKind
@@ -20,10 +20,30 @@ from slap_ros.planning.problem import Problem
 from slap_ros.relational import GroundOperator, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
-from test.planning.test_anytime_made_up import LIFTED, WORLD, MadeUpModel, Skill, plan
+from test.planning.test_anytime_made_up import LIFTED, WORLD, MadeUpModel, Skill, made_up, plan
 
-TOO_LARGE = Effort(tests=1)  # any graph is
+NOT_ALTERNATING = (
+    89,
+    173,
+    403,
+    684,
+    1137,
+    1389,
+)  # where some plan is longer than the graph is deep
 MASKS = st.sets(st.integers(0, 4), max_size=2).map(lambda bits: sum(1 << bit for bit in bits))
+
+
+@pytest.fixture
+def too_large(monkeypatch):
+    """Any graph is too large for the anytime planner, and it has all of its effort."""
+    whole = anytime.GraphPlanner.graph
+
+    def none(planner, *arguments):
+        if planner.max_nodes == GraphPlanner(planner.problem).max_nodes:
+            return whole(planner, *arguments)
+        raise PlanningLimitError("too large")
+
+    monkeypatch.setattr(anytime.GraphPlanner, "graph", none)
 
 
 @st.composite
@@ -114,13 +134,12 @@ def made_up_hand(seed):
     return Problem(MadeUpModel(), tuple(operators)), start, mask(3) or 4
 
 
-def test_a_search_as_deep_as_the_graph_proves_nothing_above_its_shortest_plan(monkeypatch):
-    monkeypatch.setattr(anytime, "SMALL", 0)
+def test_a_search_as_deep_as_the_graph_proves_nothing_above_its_shortest_plan(too_large):
     as_deep, more, sharp = 0, 0, 0
     for seed in range(600):
         problem, start, goal = made_up_hand(seed)
         lazy = plan(GraphPlanner(problem), start, goal)
-        found = plan(AnytimePlanner(made_up_hand(seed)[0], None, TOO_LARGE), start, goal)
+        found = plan(AnytimePlanner(made_up_hand(seed)[0]), start, goal)
         if lazy is None or found is None:
             continue
         grounds = [ground for ground, _ in problem.operators]
@@ -133,9 +152,19 @@ def test_a_search_as_deep_as_the_graph_proves_nothing_above_its_shortest_plan(mo
     assert sharp > 100
 
 
+@pytest.mark.parametrize("seed", NOT_ALTERNATING)
+def test_a_graph_with_ways_that_are_longer_than_it_is_deep_limits_no_depth(seed, too_large):
+    problem, _, start, goal = made_up(seed)
+    lazy = plan(GraphPlanner(problem), start, goal)
+    found = plan(AnytimePlanner(made_up(seed)[0]), start, goal)
+    grounds = [ground for ground, _ in problem.operators]
+    assert not alternate(grounds, problem.model.space.abstract(start))
+    assert found.at_least <= lazy.steps
+
+
 @pytest.mark.parametrize("seed", [300, 301])
 @pytest.mark.parametrize("shortcuts", [False, True])
-def test_towers_are_never_proven_to_take_longer_than_they_do(seed, shortcuts):
+def test_towers_are_never_proven_to_take_longer_than_they_do(seed, shortcuts, too_large):
     domain = get_domain("obstacle_tower", "fair:obstacles=2,distractors=1")
     task = domain.task(seed)
     library = chosen_library("" if shortcuts else "none", domain)
@@ -143,7 +172,7 @@ def test_towers_are_never_proven_to_take_longer_than_they_do(seed, shortcuts):
     known = library and GroundedShortcuts(domain, library.shortcuts, task.initial_state)
     goal = problem.model.space.mask(task.goal)
     lazy = GraphPlanner(problem, shortcuts=known).plan(task.initial_state, goal)
-    found = AnytimePlanner(problem, known, TOO_LARGE).plan(task.initial_state, goal)
+    found = AnytimePlanner(problem, known).plan(task.initial_state, goal)
     assert found.at_least <= lazy.steps
     assert found.at_least >= (0.4 if shortcuts else 0.8) * lazy.steps
 
