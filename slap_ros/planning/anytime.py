@@ -289,7 +289,9 @@ class _Improvement:
         return self._best is not None and self._at_least >= self._best.predicted_steps
 
     def _prove(self, rollouts: int) -> bool:
-        """Raise what is proven of any plan, until the best one is good enough; whether it rose.
+        """Raise what is proven of any plan through the graph; whether it rose.
+
+        It ends where the best plan is good enough.
 
         Args:
             rollouts: Number of roll-outs for all proofs, besides those of searches for plans.
@@ -372,7 +374,9 @@ class _Improvement:
         assert self._best is not None
         sizes = (nodes, edges) if graph is None else (len(graph.nodes), len(graph.edges))
         simulated = self._planner.problem.model.executed - self._simulated_before
-        return PlanningResult(self._best, *sizes, simulated, graph=graph, at_least=self._at_least)
+        # A plan may be shorter than all of the graph: with more options, through one near plans.
+        at_least = min(self._at_least, self._best.predicted_steps)
+        return PlanningResult(self._best, *sizes, simulated, graph=graph, at_least=at_least)
 
 
 def _nothing() -> None:

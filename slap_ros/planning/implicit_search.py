@@ -75,6 +75,7 @@ class ImplicitSearch:
 
     @property
     def _asked(self) -> int:
+        """The number of abstract states of which it was asked what is to come."""
         return self._steps_to_come.cache_info().misses
 
     def begin(self, state: State) -> None:
@@ -110,8 +111,8 @@ class ImplicitSearch:
     def _expand(self, vertex: _Entry) -> None:
         """Queue what can be done in a vertex, each option with its bound."""
         if self._shortcuts_may_begin(vertex.abstract):
-            to_come = self._steps_to_come(vertex.abstract, vertex.options) or 0
-            self._put_after(vertex, to_come - vertex.minus_g, is_open=True)
+            by_shortcut = self._steps_to_come(vertex.abstract, vertex.options) or 0
+            self._put_after(vertex, by_shortcut - vertex.minus_g, is_open=True)
         for ground, option in self._operators:
             if not ground.applicable(vertex.abstract):
                 continue
