@@ -11,13 +11,15 @@ weight, is the search of ``lazy``, and finds a plan of the same cost.
 
 Where there are too many abstract states, the graph near the best plan is searched
 (:mod:`slap_ros.planning.corridor`), shortcuts included, until that finds nothing shorter. Such a
-graph is another one for each plan, so that less effort goes into it.
+graph is another one for each plan, so that less effort goes into it. It proves nothing of other
+plans: :mod:`slap_ros.planning.plan_proof` does.
 
 The effort is limited in roll-outs and abstract states, never in seconds.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -28,10 +30,10 @@ from slap_ros.planning.corridor import CorridorBuilder
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.ff_planner import FFPlanner
 from slap_ros.planning.graph_planner import GraphPlanner
-from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
 from slap_ros.planning.lazy_search import LookAhead, SearchLimits, search_lazily
 from slap_ros.planning.model import CountedModel
 from slap_ros.planning.plan import Plan, PlanningResult
+from slap_ros.planning.plan_proof import PlanProof
 from slap_ros.planning.planner_choice import ANYTIME
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import SearchOutcome
@@ -40,6 +42,7 @@ from slap_ros.relational import State
 
 SMALL = 150  # abstract states of a graph in which nothing is gained by a first plan
 NEAR_PLANS = 4  # roll-outs of a whole graph to one of graphs near plans
+PROOFS = 8  # roll-outs and abstract states of a whole graph to those of proofs in its place
 WEIGHTS = (30.0, 3.0, 1.0)  # of bounds of what is to come, one search after the other
 SOON = 20  # roll-outs of a first search without a weight: where shortcuts are good, it ends by then
 SEARCHES = ((1.0, SOON), *((weight, None) for weight in WEIGHTS))  # of a whole graph: roll-outs
@@ -110,16 +113,20 @@ class AnytimePlanner:
         self, planned: PlanningResult, number: int, state: State, goal: int
     ) -> PlanningResult | None:
         """See :class:`~slap_ros.planning.planner.ImprovingPlanner`."""
-        edge, rest = planned.plan.edges[number], Plan(planned.plan.edges[number + 1 :])
+        done, edge = planned.plan.edges[:number], planned.plan.edges[number]
+        rest = Plan(planned.plan.edges[number + 1 :])
         if not (rest.edges and self.effort.improve) or self._is_good(planned):
             return None
         ahead = self.problem.model.roll_out(edge.option, state, edge.target)
         if not ahead.reached:
             return None
         effort = replace(self.effort, rollouts=self.effort.improve * max(1, ahead.steps))
+        # With what is done, the rest is a plan too, and takes what any plan does.
+        taken = Plan(done).predicted_steps + ahead.steps
+        known = replace(planned, plan=rest, at_least=max(0, planned.at_least - taken))
         found: list[PlanningResult] = []
         with suppress(UnsolvableError, PlanningLimitError):  # of another plan than the rest
-            found.extend(replace(self, effort=effort).improve(ahead.final, goal, rest))
+            found.extend(replace(self, effort=effort).improve(ahead.final, goal, known))
         if not found or found[-1].steps >= rest.predicted_steps:
             return None
         return replace(found[-1], origin=planned.origin)
@@ -128,14 +135,15 @@ class AnytimePlanner:
         return planned.bound is not None and planned.bound <= self.effort.within
 
     def improve(
-        self, state: State, goal: int, known: Plan | None = None
+        self, state: State, goal: int, known: PlanningResult | None = None
     ) -> Iterator[PlanningResult]:
         """Each plan that is better than those before, or of which more is proven.
 
         Args:
             state: Low-level state to start from.
             goal: Mask of atoms that must hold.
-            known: Plan from there, in the place of a first one; None without one.
+            known: Plan from there with what is proven, in the place of a first one and of proofs;
+                None without one.
 
         Returns:
             The plans, as they are found; none where no plan through the abstract graph can be
@@ -161,17 +169,19 @@ class _Improvement:
     """One run of :meth:`AnytimePlanner.improve`."""
 
     def __init__(
-        self, planner: AnytimePlanner, state: State, goal: int, known: Plan | None
+        self, planner: AnytimePlanner, state: State, goal: int, known: PlanningResult | None
     ) -> None:
         self._planner, self._state, self._goal = planner, state, goal
         self._simulated_before = planner.problem.model.executed
         self._model = CountedModel(planner.problem.model)
         self._problem = replace(planner.problem, model=self._model)
         self._limit = planner.effort.rollouts
-        self._best = known
+        self._best = None if known is None else known.plan
         self._no_first: PlanningLimitError | None = None  # why FF found no plan
-        self._at_least = 0  # environment steps of any plan
-        shortcuts = planner.shortcuts
+        self._at_least = 0 if known is None else known.at_least  # environment steps of any plan
+        shortcuts, most = planner.shortcuts, planner._most_abstract_states // PROOFS
+        self._proof = PlanProof(planner.problem, shortcuts, state, goal, most)
+        self._is_proving = known is None
         self._forget_failures = shortcuts.forget_failures_since_now() if shortcuts else _nothing
 
     def through(
@@ -220,6 +230,7 @@ class _Improvement:
         if self._best is None:
             with suppress(PlanningLimitError):  # a shortcut may still do what operators cannot
                 first = self._find_first()
+                self._prove(0)
                 yield self._result(None, first.graph_nodes, first.graph_edges)
             self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
         yield from self._around(abstract)
@@ -238,6 +249,8 @@ class _Improvement:
             for weight in WEIGHTS:
                 if self._take(self._search(graph, ahead, weight).plan):
                     yield self._result(graph)
+            if self._is_proving and self._prove(self._planner.effort.rollouts // PROOFS):
+                yield self._result(graph)
             if self._best in (None, searched) or self._model.executed >= self._limit:
                 return
             searched, route = self._best, [abstract, *self._on_the_way()]
@@ -250,8 +263,7 @@ class _Improvement:
         """
         if self._no_first is not None:
             raise self._no_first
-        abstract = self._model.space.abstract(self._state)
-        self._at_least = max(self._at_least, self._least_steps(abstract))
+        self._at_least = max(self._at_least, self._proof.by_landmarks())
         try:
             first = FFPlanner(self._problem).plan(self._state, self._goal)
         except (UnsolvableError, PlanningLimitError) as error:
@@ -260,6 +272,7 @@ class _Improvement:
                 f"{error}"
             )
             raise self._no_first from error
+        self._proof.first_options = len(first.plan.edges)
         self._take(first.plan)
         return first
 
@@ -300,15 +313,20 @@ class _Improvement:
     def _is_proven(self) -> bool:
         return self._best is not None and self._at_least >= self._best.predicted_steps
 
-    def _least_steps(self, abstract: int) -> int:
-        """Steps of any plan, by landmarks of operators and shortcuts."""
-        operators = [
-            RelaxedOperator(ground.preconditions, ground.add_effects, option.skill.least_steps)
-            for ground, option in self._problem.operators
-        ]
-        if self._planner.shortcuts is not None:
-            operators += self._planner.shortcuts.relaxed()
-        return LandmarkCut(self._goal, operators)(abstract) or 0
+    def _prove(self, rollouts: int) -> bool:
+        """Raise what is proven of any plan through the graph; whether it rose.
+
+        It ends where the best plan is good enough.
+
+        Args:
+            rollouts: Number of roll-outs for all proofs, besides those of searches for plans.
+        """
+        if self._best is None:
+            return False
+        enough = math.ceil(self._best.predicted_steps / self._planner.effort.within)
+        before = self._at_least
+        self._at_least = max(before, self._proof.by_search(rollouts, enough))
+        return self._at_least > before
 
     def _result(
         self, graph: AbstractGraph | None, nodes: int = 0, edges: int = 0
@@ -316,7 +334,9 @@ class _Improvement:
         assert self._best is not None
         sizes = (nodes, edges) if graph is None else (len(graph.nodes), len(graph.edges))
         simulated = self._planner.problem.model.executed - self._simulated_before
-        return PlanningResult(self._best, *sizes, simulated, graph=graph, at_least=self._at_least)
+        # A plan may be shorter than all of the graph: with more options, through one near plans.
+        at_least = min(self._at_least, self._best.predicted_steps)
+        return PlanningResult(self._best, *sizes, simulated, graph=graph, at_least=at_least)
 
 
 def _nothing() -> None:

@@ -13,6 +13,8 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 
 from slap_ros.planning.relaxation import bits
 
@@ -21,11 +23,20 @@ _INFINITE = 1 << 60
 
 @dataclass(frozen=True)
 class RelaxedOperator:
-    """What an option may need and add, and the environment steps that it takes at least."""
+    """What an option may need and add, and the environment steps that it takes at least.
+
+    Args:
+        preconditions: Atoms that must hold, a mask.
+        add_effects: Atoms that it may add, a mask.
+        least_steps: Environment steps that it takes at least.
+        deletes: Atoms that it deletes, a mask, if exactly its effects come of it; None where it may
+            add less and delete anything. LM-cut does not need it.
+    """
 
     preconditions: int
     add_effects: int
     least_steps: int
+    deletes: int | None = None
 
 
 class LandmarkCut:
@@ -41,6 +52,7 @@ class LandmarkCut:
         masks = [goal, *(o.preconditions | o.add_effects for o in operators)]
         size = max(mask.bit_length() for mask in masks)
         self._start, self._goal = size, size + 1
+        self._needed = reduce(or_, [goal, *(o.preconditions for o in operators)])
         self._needs = [bits(o.preconditions) or [self._start] for o in operators]
         self._needs.append(bits(goal) or [self._start])
         self._adds = [bits(o.add_effects & ~o.preconditions) for o in operators]
@@ -55,8 +67,7 @@ class LandmarkCut:
         Args:
             abstract: Abstract state to start from, a mask.
         """
-        known = self._goal - 1
-        start = [*(bit for bit in bits(abstract) if bit < known), self._start]
+        start = [*bits(abstract & self._needed), self._start]
         costs, total = list(self._costs), 0
         while True:
             value, supporter = self._h_max(start, costs)

@@ -31,6 +31,10 @@ class ShortcutSource(Protocol):
         """Each shortcut with all that it might add for any objects, as if it needed nothing."""
         ...
 
+    def may_begin(self, abstract: int) -> bool:
+        """Whether one of the shortcuts may begin in an abstract state, a mask."""
+        ...
+
     def forget_failures_since_now(self) -> Callable[[], None]:
         """What makes later failures count no more, by which a shortcut is given up.
 

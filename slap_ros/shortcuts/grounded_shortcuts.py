@@ -80,6 +80,10 @@ class GroundedShortcuts:
             for shortcut, matcher in zip(self.shortcuts, self._matchers, strict=True)
         ]
 
+    def may_begin(self, abstract: int) -> bool:
+        """See :class:`~slap_ros.planning.shortcut_source.ShortcutSource`."""
+        return any(matcher.may_begin(abstract) for matcher in self._matchers)
+
     def forget_failures_since_now(self) -> Callable[[], None]:
         """See :class:`~slap_ros.planning.shortcut_source.ShortcutSource`."""
         return self._rollouts.forget_failures_since_now()

@@ -57,19 +57,23 @@ class SignatureMatcher:
             alike.setdefault(node & self._left_alone, []).append(i)
         for group in alike.values():
             for number, i in enumerate(group):
-                if self._may_begin(nodes[i]):
+                if self.may_begin(nodes[i]):
                     yield i, [j for j in group[number + 1 :] if self._matches(nodes[i], nodes[j])]
 
     def targets(self, nodes: Sequence[int], source: int) -> list[int]:
         """The indices of the later nodes that a shortcut may reach from the node ``source``."""
-        if not self._may_begin(nodes[source]):
+        if not self.may_begin(nodes[source]):
             return []
         later = range(source + 1, len(nodes))
         matching = [j for j in later if self._matches(nodes[source], nodes[j])]
         return self._maximal(nodes, source, matching)
 
-    def _may_begin(self, source: int) -> bool:
-        """Whether as much is held as in training; see :func:`~.signature.context_of`."""
+    def may_begin(self, source: int) -> bool:
+        """Whether as much is held as in training; see :func:`~.signature.context_of`.
+
+        Args:
+            source: Abstract state in which a shortcut would begin, a mask.
+        """
         return all(bool(source & mask) == wanted for mask, wanted in self._context)
 
     def _maximal(self, nodes: Sequence[int], source: int, targets: Sequence[int]) -> list[int]:

@@ -100,6 +100,9 @@ class MadeUpShortcuts:
     def relaxed(self):
         return [RelaxedOperator(0, self.added, self.skill.least_steps)]
 
+    def may_begin(self, abstract):
+        return bool(self.added & ~abstract)
+
     def forget_failures_since_now(self):
         return lambda: None
 

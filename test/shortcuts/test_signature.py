@@ -221,7 +221,7 @@ def test_the_matcher_finds_exactly_the_pairs_that_match():
             }
             matcher = SignatureMatcher(signature, space, grasping)
             quickly = {(i, j) for i, js in matcher._by_source(graph.nodes) for j in js}
-            begins = {i for i in range(len(graph.nodes)) if matcher._may_begin(graph.nodes[i])}
+            begins = {i for i in range(len(graph.nodes)) if matcher.may_begin(graph.nodes[i])}
             assert {(i, j) for i, j in slowly if i in begins} == quickly & set(pairs)
 
 

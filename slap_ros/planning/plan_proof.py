@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is proven of any plan, where the abstract graph is too large to be searched.
+
+Landmarks say what any plan costs (:mod:`slap_ros.planning.potential`), and a search that begins in
+the start says more (:mod:`slap_ros.planning.implicit_search`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property, reduce
+from operator import or_
+
+from slap_ros.planning.implicit_search import ImplicitSearch
+from slap_ros.planning.landmark_cut import RelaxedOperator
+from slap_ros.planning.model import CountedModel
+from slap_ros.planning.potential import LeastSteps, alternate
+from slap_ros.planning.problem import Problem
+from slap_ros.planning.shortcut_source import ShortcutSource
+from slap_ros.relational import State
+
+
+class PlanProof:
+    """Environment steps that any plan takes from a state to a goal, as far as they are proven."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        shortcuts: ShortcutSource | None,
+        state: State,
+        goal: int,
+        most_states: int,
+    ) -> None:
+        """Prove nothing yet.
+
+        Args:
+            problem: Model and operators. Roll-outs for proofs are counted for themselves.
+            shortcuts: Where shortcut edges come from; None for pure planning.
+            state: Low-level state from which plans start.
+            goal: Mask of atoms that must hold.
+            most_states: Largest number of abstract states that the search asks about.
+        """
+        self._problem, self._shortcuts = problem, shortcuts
+        self._state, self._goal, self._most_states = state, goal, most_states
+        self._start = problem.model.space.abstract(state)
+        self.first_options = 0  # number of options of the plan that the FF heuristic finds
+
+    def by_landmarks(self) -> int:
+        """Environment steps by landmarks of operators and shortcuts alone."""
+        return self._least_steps(self._start) or 0
+
+    def by_search(self, rollouts: int, enough: int) -> int:
+        """Environment steps by the search, which goes on where it was.
+
+        Args:
+            rollouts: Number of roll-outs, those of earlier calls among them, at which it stops.
+            enough: Environment steps of which no more need be proven.
+        """
+        return self._search.at_least(rollouts, enough)
+
+    @cached_property
+    def _search(self) -> ImplicitSearch:
+        shortcuts = self._shortcuts
+        search = ImplicitSearch(
+            CountedModel(self._problem.model),
+            self._problem.operators,
+            self._goal,
+            self._steps_to_come,
+            _never if shortcuts is None else shortcuts.may_begin,
+            self._most_states,
+        )
+        search.begin(self._state)
+        return search
+
+    def _steps_to_come(self, abstract: int, options: int) -> int | None:
+        """See :class:`ImplicitSearch`."""
+        if self._options is not None:
+            fewest = self._fewest_options(abstract)
+            if fewest is None or options + fewest > self._options:
+                return None
+        return self._least_steps(abstract)
+
+    @cached_property
+    def _options(self) -> int | None:
+        """The number of options of each plan through the graph; None where that is not known.
+
+        Where each option changes whether one atom holds, layers of the graph alternate in it, so
+        that each forward edge leads to the next layer. The goal is in the last one.
+        """
+        grounds = [ground for ground, _ in self._problem.operators]
+        if self._shortcuts is not None or not alternate(grounds, self._start):
+            return None
+        fewest = self._fewest_options(self._start)
+        return fewest if fewest == self.first_options else None
+
+    @cached_property
+    def _fewest_options(self) -> LeastSteps:
+        """The number of options from an abstract state to the goal at least."""
+        return LeastSteps(
+            self._goal, [replace(one, least_steps=1) for one in self._relaxed_operators]
+        )
+
+    @cached_property
+    def _least_steps(self) -> LeastSteps:
+        """Steps of any plan from an abstract state, by landmarks of operators and shortcuts."""
+        by_shortcuts = () if self._shortcuts is None else self._shortcuts.relaxed()
+        return LeastSteps(self._goal, [*self._relaxed_operators, *by_shortcuts])
+
+    @cached_property
+    def _relaxed_operators(self) -> list[RelaxedOperator]:
+        """The operators with the least steps of their skills, without what always holds."""
+        grounds = [ground for ground, _ in self._problem.operators]
+        changing = reduce(or_, (one.add_effects | one.delete_effects for one in grounds), 0)
+        always = self._start & ~changing
+        return [
+            RelaxedOperator(
+                ground.preconditions & ~always,
+                ground.add_effects,
+                option.skill.least_steps,
+                ground.delete_effects,
+            )
+            for ground, option in self._problem.operators
+        ]
+
+
+def _never(_: int) -> bool:
+    """No shortcut begins where there are none."""
+    return False

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is proven of plans where the graph is too large: no search of a whole graph is below it."""
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import PlanningLimitError
+from slap_ros.planning import anytime
+from slap_ros.planning.anytime import AnytimePlanner
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
+from slap_ros.planning.options import Option, OptionKind
+from slap_ros.planning.potential import LeastSteps, alternate
+from slap_ros.planning.problem import Problem
+from slap_ros.relational import GroundOperator, State
+from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
+from slap_ros.shortcuts.shipped import chosen_library
+from test.planning.test_anytime_made_up import LIFTED, WORLD, MadeUpModel, Skill, made_up, plan
+
+NOT_ALTERNATING = (
+    89,
+    173,
+    403,
+    684,
+    1137,
+    1389,
+)  # where some plan is longer than the graph is deep
+MASKS = st.sets(st.integers(0, 4), max_size=2).map(lambda bits: sum(1 << bit for bit in bits))
+
+
+@pytest.fixture
+def too_large(monkeypatch):
+    """Any graph is too large for the anytime planner, and it has all of its effort."""
+    whole = anytime.GraphPlanner.graph
+
+    def none(planner, *arguments):
+        if planner.max_nodes == GraphPlanner(planner.problem).max_nodes:
+            return whole(planner, *arguments)
+        raise PlanningLimitError("too large")
+
+    monkeypatch.setattr(anytime.GraphPlanner, "graph", none)
+
+
+@st.composite
+def problems_with_deletes(draw):
+    """Operators, and now and then one of which only is known what it may add."""
+    operators = draw(
+        st.lists(
+            st.tuples(MASKS, MASKS, st.integers(1, 5), st.none() | MASKS), min_size=1, max_size=9
+        )
+    )
+    return draw(MASKS), draw(MASKS), [RelaxedOperator(*one) for one in operators]
+
+
+def outcomes(one, state):
+    """What may come of an operator: where little is known, any part of what it may add."""
+    if one.deletes is not None:
+        return [state & ~one.deletes | one.add_effects]
+    return [state | one.add_effects, one.add_effects, state & ~1, 0]
+
+
+def cheapest(start, goal, operators):
+    best, todo = {start: 0}, [start]
+    while todo:
+        state = min(todo, key=best.__getitem__)
+        todo.remove(state)
+        if state & goal == goal:
+            return best[state]
+        for one in operators:
+            if state & one.preconditions == one.preconditions:
+                for reached in outcomes(one, state):
+                    cost = best[state] + one.least_steps
+                    if cost < best.get(reached, cost + 1):
+                        best[reached] = cost
+                        todo.append(reached) if reached not in todo else None
+    return None
+
+
+@settings(max_examples=400, deadline=None)
+@given(problems_with_deletes())
+def test_a_potential_never_counts_more_than_the_cheapest_plan(problem):
+    start, goal, operators = problem
+    truth, bound = cheapest(start, goal, operators), LeastSteps(goal, operators)(start)
+    if truth is not None:
+        assert bound <= truth
+
+
+def test_a_hand_that_must_be_emptied_counts_as_often_as_it_is_filled():
+    """Three things to put away by one hand: LM-cut alone counts one place for all of them."""
+    empty, goal = 1, 0b1110
+    operators = []
+    for number in range(1, 4):
+        held, away = 1 << number + 3, 1 << number
+        operators += [RelaxedOperator(empty, held, 3, empty), RelaxedOperator(held, away, 2, held)]
+    places = [one if one.deletes == empty else place(one, empty) for one in operators]
+    assert LandmarkCut(goal, places)(empty) == 3 * 3 + 3 * 2  # each place is a landmark here
+    cleared = 1 << 10  # where only the picks are needed, the places between them are as well
+    picks = [
+        RelaxedOperator(one.preconditions, one.add_effects, one.least_steps, one.deletes)
+        for one in places
+    ]
+    last = RelaxedOperator(0b1110000 | empty, cleared, 1, 0)
+    assert LandmarkCut(cleared, [*picks, last])(empty) == 3 * 3 + 1
+    assert LeastSteps(cleared, [*picks, last])(empty) == 3 * 3 + 3 * 2 + 1
+
+
+def place(one, empty):
+    return RelaxedOperator(one.preconditions, one.add_effects | empty, 2, one.deletes)
+
+
+def made_up_hand(seed):
+    """A problem in which each operator fills or empties the one hand."""
+    rng = random.Random(seed)
+    empty, full, failing = 1, 2, rng.choice([0.0, 0.2])
+
+    def mask(most):
+        return sum(1 << bit for bit in rng.sample(range(2, 7), rng.randint(0, most)))
+
+    operators = []
+    for number in range(rng.randint(6, 14)):
+        before, after = [(empty, full), (full, empty)][number % 2]
+        added = mask(2)
+        ground = GroundOperator(
+            LIFTED, (), before | mask(1), after | added, before | mask(1) & ~added
+        )
+        skill = Skill(f"o{number}", rng.randrange(10**6), rng.randint(1, 5), failing)
+        operators.append((ground, Option(OptionKind.OPERATOR, skill, ())))
+    start = State(WORLD, [float(empty | mask(1)), 0.0])
+    return Problem(MadeUpModel(), tuple(operators)), start, mask(3) or 4
+
+
+def test_a_search_as_deep_as_the_graph_proves_nothing_above_its_shortest_plan(too_large):
+    as_deep, more, sharp = 0, 0, 0
+    for seed in range(600):
+        problem, start, goal = made_up_hand(seed)
+        lazy = plan(GraphPlanner(problem), start, goal)
+        found = plan(AnytimePlanner(made_up_hand(seed)[0]), start, goal)
+        if lazy is None or found is None:
+            continue
+        grounds = [ground for ground, _ in problem.operators]
+        as_deep += alternate(grounds, problem.model.space.abstract(start))
+        assert found.at_least <= lazy.steps
+        more += len(lazy.plan.edges) > 2
+        sharp += found.at_least == lazy.steps
+    assert as_deep > 100
+    assert more > 50
+    assert sharp > 100
+
+
+@pytest.mark.parametrize("seed", NOT_ALTERNATING)
+def test_a_graph_with_ways_that_are_longer_than_it_is_deep_limits_no_depth(seed, too_large):
+    problem, _, start, goal = made_up(seed)
+    lazy = plan(GraphPlanner(problem), start, goal)
+    found = plan(AnytimePlanner(made_up(seed)[0]), start, goal)
+    grounds = [ground for ground, _ in problem.operators]
+    assert not alternate(grounds, problem.model.space.abstract(start))
+    assert found.at_least <= lazy.steps
+
+
+@pytest.mark.parametrize("seed", [300, 301])
+@pytest.mark.parametrize("shortcuts", [False, True])
+def test_towers_are_never_proven_to_take_longer_than_they_do(seed, shortcuts, too_large):
+    domain = get_domain("obstacle_tower", "fair:obstacles=2,distractors=1")
+    task = domain.task(seed)
+    library = chosen_library("" if shortcuts else "none", domain)
+    problem = Problem.of(domain, task.initial_state)
+    known = library and GroundedShortcuts(domain, library.shortcuts, task.initial_state)
+    goal = problem.model.space.mask(task.goal)
+    lazy = GraphPlanner(problem, shortcuts=known).plan(task.initial_state, goal)
+    found = AnytimePlanner(problem, known).plan(task.initial_state, goal)
+    assert found.at_least <= lazy.steps
+    assert found.at_least >= (0.4 if shortcuts else 0.8) * lazy.steps
+
+
+@pytest.mark.parametrize("name", ["obstacle2d", "obstacle_tower", "cleanup_table"])
+def test_shortcuts_begin_where_they_may(name):
+    domain = get_domain(name)
+    task = domain.task(300)
+    problem = Problem.of(domain, task.initial_state)
+    space = problem.model.space
+    known = GroundedShortcuts(domain, chosen_library("", domain).shortcuts, task.initial_state)
+    planner = GraphPlanner(problem, shortcuts=known)
+    graph = planner.graph(space.abstract(task.initial_state), space.mask(task.goal))
+    begin = {edge.source for edge in known.edges(graph)}
+    begin |= {edge.source for edge in known.beyond(graph, ())}
+    assert begin
+    assert all(known.may_begin(graph.nodes[i]) for i in begin)
