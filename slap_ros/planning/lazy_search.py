@@ -270,10 +270,11 @@ class _LazySearch:
     def _expand(self, vertex: Vertex) -> None:
         """Queue the edges out of a vertex, each with its bound.
 
-        Not those that lead back: a block that is picked up and put down again lies a little
-        elsewhere, so that there would be no end to such circles.
+        Where a plan is to be made shorter, not those that lead back: a block that is picked up and
+        put down again lies a little elsewhere, so that there would be no end to such circles. For a
+        first plan, that may be what makes the next option possible.
         """
-        before = set(vertex.nodes())
+        before = set() if self._limits.below is None else set(vertex.nodes())
         for edge in self._frontier.edges_from(vertex.node):
             if edge.target in before:
                 continue

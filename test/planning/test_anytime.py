@@ -164,21 +164,26 @@ def improvements(domain, task, effort, library=None):
 class EverNewModel(MadeUpModel):
     """Each roll-out ends where none has been, and the goal is never reached."""
 
+    def knows(self, option, state, target):
+        return False
+
     def roll_out(self, option, state, target):
         self.executed += 1
         return Rollout(option.skill.name != "to_goal", 1, State(LAYOUT, [float(self.executed)]))
 
 
-def test_a_path_near_a_plan_does_not_go_round():
+def test_a_plan_is_not_made_shorter_by_going_round():
     """It would never end: where it comes back to, it has not been in this low-level state."""
     goal, model = 1 << 20, EverNewModel()
     graph = Corridor(goal, nodes=[1, 2, goal], depth=[0, 0, 0])
     for name, source, target in (("up", 0, 1), ("down", 1, 0), ("to_goal", 1, 2)):
         option = Option(OptionKind.OPERATOR, MadeUpSkill(name, 0, 0.0), ())
         graph.edges.append(Edge(source, target, option))
-    outcome = search_lazily(graph, START, model, SearchLimits(rollouts=50))
+    outcome = search_lazily(graph, START, model, SearchLimits(rollouts=50, below=100))
     assert (outcome.plan, outcome.stopped) == (None, False)
     assert model.executed == 2
+    outcome = search_lazily(graph, START, model, SearchLimits(rollouts=50))
+    assert outcome.stopped  # a first plan may need it
 
 
 def test_a_tall_tower_is_planned_for_within_the_effort_and_each_plan_is_better():
