@@ -186,6 +186,17 @@ def test_a_plan_is_not_made_shorter_by_going_round():
     assert outcome.stopped  # a first plan may need it
 
 
+def test_what_no_operators_in_a_row_can_do_is_planned_for_by_going_round():
+    """The tower's top cannot be grasped before the red block was put down elsewhere."""
+    domain = get_domain("obstacle_tower", "fair:obstacles=8")
+    task = domain.task(502)
+    goal = domain.atom_space(task.initial_state).mask(task.goal)
+    plan = make_planner("anytime", domain, task.initial_state).plan(task.initial_state, goal).plan
+    names = [edge.option.skill.name for edge in plan.edges]
+    assert names[:2] == ["Pick", "Place"]
+    assert len(names) > 18
+
+
 def test_a_tall_tower_is_planned_for_within_the_effort_and_each_plan_is_better():
     domain = slap_ros.make("obstacle_tower", obstacles=6)
     task, effort = domain.task(seed=1), Effort(rollouts=12, tests=10_000)
