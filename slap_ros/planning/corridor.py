@@ -24,6 +24,7 @@ from slap_ros.planning.shortcut_source import ShortcutSource
 from slap_ros.relational import GroundOperator
 
 MAX_EXPANSIONS = 2_000  # abstract states, to find one way to the goal
+MOST_DETOURS = 20  # helpful operators, the first along a plan, after which a way is looked for
 
 Step = tuple[int, Option, int]  # abstract state, what is done there, and where it leads
 
@@ -65,16 +66,19 @@ class CorridorBuilder:
             route: Abstract states, masks; the first is the one to start from.
         """
         steps: dict[Step, None] = {}  # ordered, each once
+        detours = MOST_DETOURS
         for source in route:
-            for first in self._first_steps(source):
-                if first is not None:
-                    steps[first] = None
-                steps.update(dict.fromkeys(self._steps_from(source if first is None else first[2])))
+            steps.update(dict.fromkeys(self._steps_from(source)))
+            for first in self._helpful_steps(source):
+                if first[2] not in self._ways:
+                    if not detours:
+                        break
+                    detours -= 1
+                steps[first] = None
+                steps.update(dict.fromkeys(self._steps_from(first[2])))
         return _graph_of(route[0], self.goal, steps)
 
-    def _first_steps(self, source: int) -> Iterator[Step | None]:
-        """No step, and each that is helpful."""
-        yield None
+    def _helpful_steps(self, source: int) -> Iterator[Step]:
         helpful = self._heuristic.helpful_atoms(source)
         for operator, option in self.options:
             if operator.add_effects & helpful and operator.applicable(source):
