@@ -89,7 +89,9 @@ def _canonical(value: object) -> Iterator[bytes]:
             part = getattr(value, field.name)
             if (type_name, field.name) == (DOMAIN_INFO, "configuration"):
                 part = [pair for pair in part if (pair.key, pair.value) not in ADDED_SETTINGS]
-            if field.name not in excluded and (field.name not in added or part):
+            if field.name in added and (not part or field.name.isupper()):
+                continue  # a constant is the same in all messages, whether they use it or not
+            if field.name not in excluded:
                 yield from _canonical(part)
     else:
         raise TypeError(f"rosbags gave a message a {type(value).__name__}")
