@@ -20,6 +20,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.relational import GroundOperator, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
+from support.cheapest_plans import cheapest
 from test.planning.test_anytime_made_up import LIFTED, WORLD, MadeUpModel, Skill, made_up, plan
 
 NOT_ALTERNATING = (
@@ -64,28 +65,11 @@ def outcomes(one, state):
     return [state | one.add_effects, one.add_effects, state & ~1, 0]
 
 
-def cheapest(start, goal, operators):
-    best, todo = {start: 0}, [start]
-    while todo:
-        state = min(todo, key=best.__getitem__)
-        todo.remove(state)
-        if state & goal == goal:
-            return best[state]
-        for one in operators:
-            if state & one.preconditions == one.preconditions:
-                for reached in outcomes(one, state):
-                    cost = best[state] + one.least_steps
-                    if cost < best.get(reached, cost + 1):
-                        best[reached] = cost
-                        todo.append(reached) if reached not in todo else None
-    return None
-
-
 @settings(max_examples=400, deadline=None)
 @given(problems_with_deletes())
 def test_a_potential_never_counts_more_than_the_cheapest_plan(problem):
     start, goal, operators = problem
-    truth, bound = cheapest(start, goal, operators), LeastSteps(goal, operators)(start)
+    truth, bound = cheapest(start, goal, operators, outcomes), LeastSteps(goal, operators)(start)
     if truth is not None:
         assert bound <= truth
 
