@@ -21,7 +21,9 @@ from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
-from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, save_library
+from slap_ros.shortcuts.shipped import require_same_skills
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_library, save_library
 from slap_ros.shortcuts.subgoals import SubgoalTraining
 from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
 from slap_ros.skills.domain_choice import WORDS, DomainChoice
@@ -59,6 +61,7 @@ def train(
     jobs: int | None = None,
     ray: str | None = None,
     callback: TrainingCallback | None = None,
+    keep: Path | str | None = None,
 ) -> ShortcutLibrary:
     """Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.
 
@@ -78,6 +81,8 @@ def train(
             ``if __name__ == "__main__"``.
         ray: Address of a Ray cluster to run on instead, or ``local``.
         callback: Receiver of the events of training.
+        keep: Library of an earlier training. Its shortcuts are options like any other in this one,
+            and part of the new library. None for no such library.
 
     Returns:
         The library, which :func:`plan` takes as ``shortcuts``.
@@ -85,11 +90,14 @@ def train(
     Raises:
         NoSkillsError: The domain has no skills to begin with.
         InvalidParameterError: Torch is not installed, or a setting cannot be what it is to be.
+        InvalidLibraryError: The library to keep is damaged, or another domain's.
+        SkillsChangedError: It was learned over other skills.
         BusyError: Another process trains in the same folder.
     """
     require_skills(domain)
     require_whole("seed", seed)
     chosen = chosen_settings(domain, settings, changes, steps)
+    kept = () if keep is None else _shortcuts_to_keep(Path(keep), domain)
     library_folder, work_folder = Path(folder), training_folder(folder, work)
     for place in (library_folder, work_folder):
         require_writable(place)
@@ -99,8 +107,8 @@ def train(
     watched = callback if callback is not None else Unwatched()
     with sole_use(work_folder), some_workers(jobs, ray) as workers:
         kind = SubgoalTraining if chosen.together > 1 else Training
-        library = kind(distribution, chosen, work_folder, workers, watched).run()
-    command = train_command(choice, seed, settings, steps, change_texts(changes))
+        library = kind(distribution, chosen, work_folder, workers, watched, kept).run()
+    command = train_command(choice, seed, settings, steps, change_texts(changes), keep)
     made_by: dict[str, Any] = {"command": command}
     if acquired := describe_skills(domain):
         made_by["skills"] = acquired
@@ -139,7 +147,12 @@ def chosen_settings(
 
 
 def train_command(
-    choice: DomainChoice, seed: int, settings: str, steps: int | None, changes: Sequence[str]
+    choice: DomainChoice,
+    seed: int,
+    settings: str,
+    steps: int | None,
+    changes: Sequence[str],
+    keep: Path | str | None = None,
 ) -> str:
     """The command that trains the same library again.
 
@@ -149,11 +162,22 @@ def train_command(
         settings: Name of the settings.
         steps: Environment steps per shortcut, if they are given.
         changes: Settings to change, as texts.
+        keep: Library of an earlier training whose shortcuts are kept, if there is one.
     """
     command = f"slap train {choice.name} --preset {choice.preset}{skills_option(choice.skills)}"
     given = "" if steps is None else f" --steps {steps}"
     sets = "".join(f" --set {shlex.quote(text)}" for text in changes)
-    return f"{command} --seed {seed} --settings {settings}{given}{sets}"
+    kept = "" if keep is None else f" --keep {shlex.quote(relpath(keep))}"
+    return f"{command} --seed {seed} --settings {settings}{given}{sets}{kept}"
+
+
+def _shortcuts_to_keep(folder: Path, domain: Domain) -> tuple[Shortcut, ...]:
+    """All shortcuts of a library, which must be whole and learned over the domain's skills."""
+    library = load_library(folder, domain)
+    for refused in library.refused:
+        raise refused
+    require_same_skills(library, domain, str(folder))
+    return library.shortcuts
 
 
 def skills_option(skills: str) -> str:

@@ -56,6 +56,14 @@ class TrainOptions:
             "or the name of the domain's own."
         ),
     ] = "ours"
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Library of an earlier training, whose shortcuts are options like any other and "
+            "become part of the new library.",
+        ),
+    ] = None
     set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None
     steps: Annotated[
         int | None,
@@ -101,6 +109,7 @@ def train(options: TrainOptions) -> int:
             jobs=options.jobs,
             ray=options.ray,
             callback=bars,
+            keep=options.keep,
         )
     seconds = monotonic() - began
     if options.json:

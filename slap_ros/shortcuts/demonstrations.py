@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, SlapError
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
+from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.observation_encoder import (
     ObservationEncoder,
     ObservationLayout,
@@ -93,6 +94,7 @@ def demonstrate(
     signature: Signature,
     tries: int,
     rng: np.random.Generator,
+    kept: KeptShortcuts = NOTHING_KEPT,
 ) -> ShortcutDemonstration | None:
     """Execute the skills from a start to its target, and make the execution shorter.
 
@@ -102,6 +104,7 @@ def demonstrate(
         signature: Signature of the shortcut.
         tries: Number of stretches that are tried.
         rng: Generator that draws the stretches.
+        kept: Shortcuts that are skills like any other.
 
     Returns:
         The demonstration; None where skills do not lead to the target, or with actions that the
@@ -110,9 +113,8 @@ def demonstrate(
     (start,) = restore_starts(domain, [record])
     problem = Problem.of(domain, start.state)
     try:
-        graph = build_abstract_graph(
-            start.space.abstract(start.state), start.target, problem.operators
-        )
+        planner = kept.planner(domain, problem, start.state)
+        graph = graph_of(planner, start.space.abstract(start.state), start.target)
     except SlapError:  # no operators lead there
         return None
     executor = ChainExecutor(domain, problem.model.space, start.state)

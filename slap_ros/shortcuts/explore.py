@@ -22,8 +22,7 @@ import numpy as np
 from slap_ros.core import Domain, Task
 from slap_ros.errors import UnsolvableError
 from slap_ros.learning.stored_keys import restored, stored
-from slap_ros.planning.abstract_graph import Edge, build_abstract_graph
-from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.abstract_graph import Edge
 from slap_ros.planning.plan import Plan
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import Vertex
@@ -36,6 +35,7 @@ from slap_ros.shortcuts.exploration_policies import (
     RandomExploration,
 )
 from slap_ros.shortcuts.exploration_steps import exploration_worlds, most_rollout_steps
+from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.rollout_origins import OptionRetracer, RolloutOrigin
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
@@ -197,6 +197,7 @@ class Explorer:
         plan: Plan,
         settings: ExplorationSettings,
         rng: np.random.Generator,
+        kept: KeptShortcuts = NOTHING_KEPT,
     ) -> None:
         """Build the task's abstract graph; see :meth:`of_task`.
 
@@ -204,10 +205,11 @@ class Explorer:
             domain: Domain of the task.
             problem: Operators and model over the task's objects.
             task: Task to explore.
-            plan: Plan without shortcuts for the task.
+            plan: Plan for the task, with no other shortcuts than those kept.
             settings: Number of rollouts, number of nodes that they begin in, and other settings of
                 exploration.
             rng: Generator that draws the random actions.
+            kept: Shortcuts that are options like any other.
         """
         self.task = task
         self._domain, self._problem, self._plan = domain, problem, plan
@@ -218,8 +220,10 @@ class Explorer:
             for atom in self.space.atoms
             if atom.predicate in learner_interface(domain).grasping
         )
-        self.graph = build_abstract_graph(
-            self.space.abstract(task.initial_state), self.space.mask(task.goal), problem.operators
+        self.graph = graph_of(
+            kept.planner(domain, problem, task.initial_state),
+            self.space.abstract(task.initial_state),
+            self.space.mask(task.goal),
         )
         nodes = self.graph.nodes
         self._joined = {(nodes[edge.source], nodes[edge.target]) for edge in self.graph.edges}
@@ -241,6 +245,7 @@ class Explorer:
         index: int,
         settings: ExplorationSettings,
         rng: np.random.Generator,
+        kept: KeptShortcuts = NOTHING_KEPT,
     ) -> Explorer:
         """The explorer of a task, which is planned for first.
 
@@ -251,6 +256,7 @@ class Explorer:
             settings: Number of rollouts, number of nodes that they begin in, and other settings of
                 exploration.
             rng: Generator that draws the random actions.
+            kept: Shortcuts that are options like any other.
 
         Raises:
             UnsolvableError: The task has no plan that reaches the goal in the model.
@@ -259,14 +265,14 @@ class Explorer:
         task = domain.task(seed, index)
         problem = Problem.of(domain, task.initial_state)
         goal = problem.model.space.mask(task.goal)
-        found = GraphPlanner(problem).plan(task.initial_state, goal)
+        found = kept.planner(domain, problem, task.initial_state).plan(task.initial_state, goal)
         if found.fails:  # its steps end there, and say nothing of how long a plan is
             raise UnsolvableError(found.fails)
-        return cls(domain, problem, task, found.plan, settings, rng)
+        return cls(domain, problem, task, found.plan, settings, rng, kept)
 
     @property
     def plan_steps(self) -> int:
-        """Environment steps of the plan without shortcuts."""
+        """Environment steps of the plan, with no other shortcuts than those kept."""
         return self._plan.predicted_steps
 
     def explore(self) -> ExplorationResult:
@@ -301,7 +307,8 @@ class Explorer:
             vertices: Vertices in which the first of the skills may begin.
             to_go: Estimated environment steps from each node to a goal.
         """
-        chains = StraightenedChains(self._domain, self._problem, self.graph)
+        regrasps = self._settings.regrasps
+        chains = StraightenedChains(self._domain, self._problem, self.graph, regrasps)
         nodes, tries = self.graph.nodes, self._settings.straightened
         for vertex in vertices:
             for pair in chains.leading_from(vertex.node):
@@ -321,7 +328,7 @@ class Explorer:
                     origin = RolloutOrigin(vertex, vertex.state)
                     yield replace(
                         self._candidate(vertex, origin, target, reached),
-                        signature=chains.signature(vertex.node, end),
+                        signature=chains.signature(vertex.node, pair),
                         replaced=tuple(edge.option.skill.name for edge in pair),
                     )
 

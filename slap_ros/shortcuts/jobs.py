@@ -30,6 +30,7 @@ from slap_ros.shortcuts.demonstrations import (
 )
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
+from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts
 from slap_ros.shortcuts.progress import (
     Progress,
     ProgressRecorder,
@@ -57,7 +58,10 @@ VALIDATION = TaskRange("validation", 90_000)
 
 
 def explore(
-    distribution: TaskDistribution, index: int, settings: ExplorationSettings
+    distribution: TaskDistribution,
+    index: int,
+    settings: ExplorationSettings,
+    kept: KeptShortcuts = NOTHING_KEPT,
 ) -> dict[str, Any]:
     """Explore one task.
 
@@ -65,6 +69,7 @@ def explore(
         distribution: Distribution from which the task is drawn.
         index: Index of the task among those that are explored, from 0.
         settings: Settings of exploration.
+        kept: Shortcuts that are options like any other.
 
     Returns:
         An :class:`~slap_ros.shortcuts.explore.ExplorationResult` as JSON, with ``cpu_s``.
@@ -74,30 +79,38 @@ def explore(
         PlanningLimitError: A limit was reached before a plan was found.
     """
     began = process_time()
-    found = explorer(distribution, index, settings).explore()
+    found = explorer(distribution, index, settings, kept).explore()
     return {**found.as_json(), "cpu_s": process_time() - began}
 
 
-def explorer(distribution: TaskDistribution, index: int, settings: ExplorationSettings) -> Explorer:
+def explorer(
+    distribution: TaskDistribution,
+    index: int,
+    settings: ExplorationSettings,
+    kept: KeptShortcuts = NOTHING_KEPT,
+) -> Explorer:
     """The explorer of one task, with its random numbers.
 
     Args:
         distribution: Distribution from which the task is drawn.
         index: Index of the task among those that are explored, from 0.
         settings: Settings of exploration.
+        kept: Shortcuts that are options like any other.
 
     Raises:
         UnsolvableError: The task has no plan.
         PlanningLimitError: A limit was reached before a plan was found.
     """
     rng = np.random.default_rng([distribution.seed, EXPLORATION.first, index])
-    return Explorer.of_task(
-        distribution.make_domain(), distribution.task_seed, EXPLORATION.index(index), settings, rng
-    )
+    task = distribution.task_seed, EXPLORATION.index(index)
+    return Explorer.of_task(distribution.make_domain(), *task, settings, rng, kept)
 
 
 def try_to_explore(
-    distribution: TaskDistribution, index: int, settings: ExplorationSettings
+    distribution: TaskDistribution,
+    index: int,
+    settings: ExplorationSettings,
+    kept: KeptShortcuts = NOTHING_KEPT,
 ) -> dict[str, Any] | str:
     """What :func:`explore` returns, or why the task has no plan, in words.
 
@@ -105,9 +118,10 @@ def try_to_explore(
         distribution: Distribution from which the task is drawn.
         index: Index of the task.
         settings: Settings of exploration.
+        kept: Shortcuts that are options like any other.
     """
     try:
-        return explore(distribution, index, settings)
+        return explore(distribution, index, settings, kept)
     except (UnsolvableError, PlanningLimitError) as error:
         return str(error)
 
@@ -120,6 +134,7 @@ def start(
     operator_steps: Mapping[str, float],
     beyond: bool = False,
     anywhere: bool = False,
+    kept: KeptShortcuts = NOTHING_KEPT,
 ) -> dict[str, Any] | None:
     """The start of a shortcut in one task; see :func:`~slap_ros.shortcuts.starts.find_start`.
 
@@ -131,6 +146,7 @@ def start(
         operator_steps: Mean environment steps of each operator, by name.
         beyond: Whether the shortcut leads to abstract states that operators alone do not reach.
         anywhere: Whether it is drawn from all that any operators lead to.
+        kept: Shortcuts that are options like any other.
 
     Returns:
         A :class:`~slap_ros.shortcuts.starts.StartRecord` as JSON; None where there is no start.
@@ -145,12 +161,17 @@ def start(
         operator_steps,
         beyond,
         drawing,
+        kept,
     )
     return None if found is None else found.as_json()
 
 
 def demonstration(
-    distribution: TaskDistribution, start: StartRecord, signature: Signature, tries: int
+    distribution: TaskDistribution,
+    start: StartRecord,
+    signature: Signature,
+    tries: int,
+    kept: KeptShortcuts = NOTHING_KEPT,
 ) -> dict[str, Any] | None:
     """A demonstration of a shortcut; see :func:`~slap_ros.shortcuts.demonstrations.demonstrate`.
 
@@ -159,13 +180,14 @@ def demonstration(
         start: Start of the shortcut.
         signature: Signature of the shortcut.
         tries: Number of stretches that are tried to make the skills' execution shorter.
+        kept: Shortcuts that are skills like any other.
 
     Returns:
         A :class:`~slap_ros.shortcuts.demonstrations.ShortcutDemonstration` as JSON; None where
         skills do not show the shortcut.
     """
     rng = np.random.default_rng([distribution.seed, STARTS.first, start.index])
-    found = demonstrate(distribution.make_domain(), start, signature, tries, rng)
+    found = demonstrate(distribution.make_domain(), start, signature, tries, rng, kept)
     return None if found is None else found.as_json()
 
 

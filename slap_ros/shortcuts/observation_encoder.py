@@ -37,7 +37,9 @@ ACHIEVED = 1e-9  # deficit below which an atom counts as achieved
 
 
 def uses_gripper(domain: Domain, signature: Signature) -> bool:
-    """Whether the shortcut changes what is held, so that the gripper is among its actions."""
+    """Whether the gripper is among its actions: it changes what is held, at its end or before."""
+    if signature.regrasps:
+        return True
     grasping = {predicate.name for predicate in learner_interface(domain).grasping}
     return any(predicate in grasping for _, predicate, _ in signature.patterns)
 

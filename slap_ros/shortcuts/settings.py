@@ -45,6 +45,8 @@ class ExplorationSettings:
         straightened: Number of stretches that are tried to make the execution of two skills, one
             after the other, shorter (:mod:`slap_ros.shortcuts.straightening`); 0 for no such
             executions.
+        regrasps: Whether two skills also show what leaves the hand as it was, though they take or
+            release something on the way. Its policy has the gripper then.
     """
 
     tasks: int = 4
@@ -59,6 +61,7 @@ class ExplorationSettings:
     beyond: bool = False
     budget: int = 0
     straightened: int = 0
+    regrasps: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
@@ -67,10 +70,8 @@ class ExplorationSettings:
         where there is none, as work folders have it from when there was no other way.
         """
         data = stored(self)
-        for name in ("also_repeat", "pushes", "inside", "beyond", "budget", "straightened"):
-            if not data[name]:
-                del data[name]
-        return data
+        others = ("also_repeat", "pushes", "inside", "beyond", "budget", "straightened", "regrasps")
+        return {name: value for name, value in data.items() if value or name not in others}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> ExplorationSettings:

@@ -136,6 +136,8 @@ class Signature:
             with a block in the hand is another one than with the hand empty.
         counted: Whether it matches changes of exactly as many atoms and objects. What two skills
             show is done with one object; with several it would be done again and again.
+        regrasps: Whether something is taken or released on the way, though nothing about what is
+            held changes.
     """
 
     roles: tuple[Kind, ...]
@@ -143,6 +145,7 @@ class Signature:
     delete: frozenset[tuple[str, tuple[int, ...]]]
     context: frozenset[str] = frozenset()
     counted: bool = False
+    regrasps: bool = False
 
     @classmethod
     def of(
@@ -171,13 +174,14 @@ class Signature:
         return cls(roles, lifted(change.add), lifted(change.delete), context)
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, which says that it is counted only where it is."""
+        """A JSON object, which says that it is counted, or regrasps, only where it is so."""
         return {
             "roles": list(self.roles),
             "add": [[predicate, list(roles)] for predicate, roles in sorted(self.add)],
             "delete": [[predicate, list(roles)] for predicate, roles in sorted(self.delete)],
             "context": sorted(self.context),
             **({"counted": True} if self.counted else {}),
+            **({"regrasps": True} if self.regrasps else {}),
         }
 
     @classmethod
@@ -193,8 +197,8 @@ class Signature:
             return frozenset((str(name), tuple(int(i) for i in about)) for name, about in lists)
 
         context = frozenset(str(name) for name in data["context"])
-        counted = bool(data.get("counted", False))
-        signature = cls(roles, atoms(data["add"]), atoms(data["delete"]), context, counted)
+        marks = bool(data.get("counted", False)), bool(data.get("regrasps", False))
+        signature = cls(roles, atoms(data["add"]), atoms(data["delete"]), context, *marks)
         used = {i for _, about in signature.add | signature.delete for i in about}
         if not used <= set(range(len(roles))):
             raise ValueError(f"an atom is about a role that is not among the {len(roles)}")
@@ -222,7 +226,8 @@ class Signature:
     def name(self) -> str:
         """The predicates that are added, and a hash that tells different signatures apart."""
         parts = (self.roles, sorted(self.add), sorted(self.delete), sorted(self.context))
-        text = repr((*parts, "counted") if self.counted else parts)
+        marks = {"counted": self.counted, "regrasps": self.regrasps}
+        text = repr((*parts, *(name for name, marked in marks.items() if marked)))
         words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
         return f"{words}-{sha256(text.encode()).hexdigest()[:8]}"
 

@@ -23,13 +23,13 @@ from slap_ros.planning.abstract_graph import (
     Edge,
     EdgeBeyond,
     add_beyond,
-    build_abstract_graph,
 )
 from slap_ros.planning.options import Option, hold_option
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import AtomSpace, State
 from slap_ros.shortcuts.explore import OperatorPath
+from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
@@ -106,6 +106,7 @@ def find_start(
     operator_steps: Mapping[str, float],
     beyond: bool = False,
     rng: np.random.Generator | None = None,
+    kept: KeptShortcuts = NOTHING_KEPT,
 ) -> StartRecord | None:
     """The start of a shortcut of this signature in a task.
 
@@ -123,6 +124,7 @@ def find_start(
         beyond: Whether the shortcut leads to abstract states that operators alone do not reach.
         rng: Generator that draws one of the sources from which the shortcut leads on; None for the
             one that is nearest to the goal.
+        kept: Shortcuts that are options like any other.
 
     Returns:
         The start; None where the task has none, or cannot be solved at all.
@@ -131,9 +133,8 @@ def find_start(
     problem = Problem.of(domain, task.initial_state)
     space = problem.model.space
     try:
-        graph = build_abstract_graph(
-            space.abstract(task.initial_state), space.mask(task.goal), problem.operators
-        )
+        planner = kept.planner(domain, problem, task.initial_state)
+        graph = graph_of(planner, space.abstract(task.initial_state), space.mask(task.goal))
     except SlapError:  # a task that cannot be solved teaches nothing here
         return None
     about = (signature, space, learner_interface(domain).grasping)

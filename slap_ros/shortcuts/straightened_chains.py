@@ -29,14 +29,18 @@ Pair = tuple[Edge, Edge]
 class StraightenedChains:
     """The pairs of skills of one task's graph."""
 
-    def __init__(self, domain: Domain, problem: Problem, graph: AbstractGraph) -> None:
+    def __init__(
+        self, domain: Domain, problem: Problem, graph: AbstractGraph, regrasps: bool = False
+    ) -> None:
         """Execute nothing yet.
 
         Args:
             domain: Domain with the skills.
             problem: Operators and model over the task's objects.
             graph: Abstract planning graph of the task.
+            regrasps: Whether skills may change what is held on the way alone.
         """
+        self._regrasps = regrasps
         self._domain, self._space, self._graph = domain, problem.model.space, graph
         self._forward = graph.forward_edges()
         self.steps = 0  # environment steps so far
@@ -78,33 +82,40 @@ class StraightenedChains:
         self.steps += executor.steps
         if commands is None:
             return None
-        signature, change = self._lifted(node, pair[1].target)
+        signature, change = self._lifted(node, pair)
         encoder = ObservationEncoder(self._domain, self._space, signature, change)
         straightener = Straightener(self._domain, encoder, state)
         found = straightener.shorten(commands, tries, rng)
         self.steps += straightener.steps
         return found
 
-    def signature(self, node: int, target: int) -> Signature:
-        """The signature of the shortcut from a node to another one, which matches this change.
+    def signature(self, node: int, pair: Pair) -> Signature:
+        """The signature of the shortcut in the place of two skills, which matches this change.
 
         Where the same can be done with more objects, the whole of that would be the change that a
         signature matches. Skills show it with one of them, so that it is counted.
 
         Args:
             node: Index of the node in which the shortcut begins.
-            target: Index of the node that it leads to.
+            pair: Edges of the skills.
         """
-        signature, _ = self._lifted(node, target)
+        signature, _ = self._lifted(node, pair)
         grasping = learner_interface(self._domain).grasping
         matcher = SignatureMatcher(signature, self._space, grasping)
-        if target in matcher.targets(self._graph.nodes, node):
+        if pair[1].target in matcher.targets(self._graph.nodes, node):
             return signature
         return replace(signature, counted=True)
 
-    def _lifted(self, node: int, target: int) -> tuple[Signature, Change]:
-        """The change from a node to another one, and the signature that it has by itself."""
-        nodes, grasping = self._graph.nodes, learner_interface(self._domain).grasping
-        change = Change.between(nodes[node], nodes[target])
-        context = context_of(nodes[node], grasping, self._space)
-        return Signature.of(change, self._space, context), change
+    def _lifted(self, node: int, pair: Pair) -> tuple[Signature, Change]:
+        """The change that two skills make from a node, and the signature that it has by itself."""
+        grasping = learner_interface(self._domain).grasping
+        before, between, after = (
+            self._graph.nodes[i] for i in (node, pair[0].target, pair[1].target)
+        )
+        change, context = Change.between(before, after), context_of(before, grasping, self._space)
+        signature = Signature.of(change, self._space, context)
+        if not self._regrasps:
+            return signature, change
+        held = self._space.mask(atom for atom in self._space.atoms if atom.predicate in grasping)
+        on_the_way = bool((before ^ between) & held) and not (before ^ after) & held
+        return replace(signature, regrasps=on_the_way), change

@@ -25,6 +25,7 @@ from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.demonstrations import ShortcutDemonstration
 from slap_ros.shortcuts.exploration_policies import RANDOM
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
+from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -189,6 +190,8 @@ class Training:
         folder: Work folder of the training; see :mod:`slap_ros.shortcuts.work_folder`.
         workers: Workers that run the jobs.
         callback: Callback that receives the events of the training.
+        kept: Shortcuts of an earlier training, which are options like any other in this one, and
+            part of the library that it makes.
     """
 
     distribution: TaskDistribution
@@ -196,12 +199,15 @@ class Training:
     folder: Path
     workers: Workers
     callback: TrainingCallback
+    kept: tuple[Shortcut, ...] = ()
     _shortcuts: list[Shortcut] = field(default_factory=list, init=False)
     _validation: list[int] = field(default_factory=list, init=False)  # tasks that have a plan
     _spent: int = field(default=0, init=False)  # environment steps of exploring and learning
 
     def __post_init__(self) -> None:
         self._work = WorkFolder(self.folder)
+        self._shortcuts.extend(self.kept)
+        self._kept = KeptShortcuts(self.kept, self.settings.sampling)
 
     def run(self) -> ShortcutLibrary:
         """Train until nothing else is worth learning, or go on where an earlier run ended.
@@ -215,6 +221,8 @@ class Training:
         self._require_tasks()
         self._require_same_settings()
         length = baseline = self._validate_without()
+        if self.kept:
+            length = self._plan_length(self.kept)
         explored = self._explore()
         self._spent = sum(result.environment_steps for result in explored)
         ranked = rank(explored)
@@ -323,7 +331,8 @@ class Training:
 
     def _require_same_settings(self) -> None:
         """Refuse a folder with another training."""
-        self._work.require_same({"place": self.distribution.as_json(), **self.settings.as_json()})
+        place = self.distribution.as_json()
+        self._work.require_same({"place": place, **self.settings.as_json(), **self._kept_record()})
 
     def _explore(self) -> list[ExplorationResult]:
         return cached_jobs(
@@ -341,7 +350,7 @@ class Training:
 
     def _explore_what_can_be(self, finished: FinishedJobs) -> list[Any]:
         tasks = self.settings.exploration.tasks
-        work = [(self._any_goal, i, self.settings.exploration) for i in range(tasks)]
+        work = [(self._any_goal, i, self.settings.exploration, self._kept) for i in range(tasks)]
         found = self._run("exploring tasks", jobs.try_to_explore, work, finished)
         self._leave_out(jobs.EXPLORATION, found)
         return [result for result in found if not isinstance(result, str)]
@@ -390,6 +399,7 @@ class Training:
                 operator_steps,
                 group.beyond,
                 anywhere,
+                self._kept,
             )
             for i in range(self.settings.starts)
         ]
@@ -407,7 +417,10 @@ class Training:
         cloning = self.settings.cloning
         if cloning is None:
             return ()
-        work = [(self.distribution, start, signature, cloning.straightened) for start in starts]
+        work = [
+            (self.distribution, start, signature, cloning.straightened, self._kept)
+            for start in starts
+        ]
         return cached_jobs(
             self._work,
             f"{signature.name}/demonstrations",
@@ -502,14 +515,23 @@ class Training:
         """The results of a step's jobs, in their order."""
         return run_in_order(self.workers, function, work, what, self.callback, finished)
 
+    def _kept_record(self) -> dict[str, Any]:
+        """Which shortcuts are kept; nothing where none are."""
+        if not self.kept:
+            return {}
+        digest = ShortcutLibrary(self.distribution.domain.name, self.kept).digest
+        return {"kept": {"digest": digest, "shortcuts": [one.name for one in self.kept]}}
+
     def _record(
         self, explored: Sequence[ExplorationResult], baseline: float, length: float
     ) -> dict[str, Any]:
-        steps = [int(shortcut.record.get("environment_steps", 0)) for shortcut in self._shortcuts]
+        learned = self._shortcuts[len(self.kept) :]
+        steps = [int(shortcut.record.get("environment_steps", 0)) for shortcut in learned]
         return {
             "preset": self.distribution.domain.preset,
             "seed": self.distribution.seed,
             "validation": {"pure_planning": baseline, "slap": length},
+            **self._kept_record(),
             "environment_steps": {
                 "exploring": sum(result.environment_steps for result in explored),
                 "learning": sum(steps),
