@@ -290,7 +290,8 @@ class Explorer:
                 if target is not None:
                     candidates += self._candidates(origin, target, reached)
         if self._settings.straightened:
-            candidates += self._straightened(vertices, to_go)
+            along = self._along_plan(vertices) if self._settings.along_plan else []
+            candidates += self._straightened([*vertices, *along], to_go)
         return ExplorationResult(
             tuple(candidate for candidate in candidates if candidate.expected_saving > 0.0),
             len(self.graph.candidates()),
@@ -331,6 +332,25 @@ class Explorer:
                         signature=chains.signature(vertex.node, pair),
                         replaced=tuple(edge.option.skill.name for edge in pair),
                     )
+
+    def _along_plan(self, vertices: Sequence[Vertex]) -> list[Vertex]:
+        """The vertices that the plan leads to, without those of nodes that are among others.
+
+        Args:
+            vertices: The others.
+        """
+        known, at, found = {v.node for v in vertices}, Vertex(0, self.task.initial_state, 0), []
+        forward = self.graph.forward_edges()
+        for option in (planned.option for planned in self._plan.edges):
+            same = (e for e in forward[at.node] if str(e.option) == str(option))
+            ways = (self._follow(at, replace(e, option=option)) for e in same)  # in that attempt
+            following = next((way for way in ways if way is not None), None)
+            if following is None:
+                break
+            at = following
+            if at.node not in known:
+                found.append(at)
+        return found
 
     @property
     def _taken(self) -> int:

@@ -21,6 +21,18 @@ from slap_ros.shortcuts.sampling import DEFAULT, PAPER, Sampling
 from slap_ros.shortcuts.stopping import Stopping
 
 
+OTHER_WAYS = (
+    "also_repeat",
+    "pushes",
+    "inside",
+    "beyond",
+    "budget",
+    "straightened",
+    "regrasps",
+    "along_plan",
+)  # settings of exploration that work folders lack where they are off
+
+
 @dataclass(frozen=True)
 class ExplorationSettings:
     """Collecting states and pruning candidates (SLAP §4.2, B.1).
@@ -47,6 +59,7 @@ class ExplorationSettings:
             executions.
         regrasps: Whether two skills also show what leaves the hand as it was, though they take or
             release something on the way. Its policy has the gripper then.
+        along_plan: Whether the first of two skills may also begin wherever the plan leads.
     """
 
     tasks: int = 4
@@ -62,6 +75,7 @@ class ExplorationSettings:
     budget: int = 0
     straightened: int = 0
     regrasps: bool = False
+    along_plan: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
@@ -70,8 +84,7 @@ class ExplorationSettings:
         where there is none, as work folders have it from when there was no other way.
         """
         data = stored(self)
-        others = ("also_repeat", "pushes", "inside", "beyond", "budget", "straightened", "regrasps")
-        return {name: value for name, value in data.items() if value or name not in others}
+        return {name: value for name, value in data.items() if value or name not in OTHER_WAYS}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> ExplorationSettings:
