@@ -72,7 +72,7 @@ def train(
         folder: Folder that the library is saved to.
         seed: Seed of all random numbers.
         settings: Name of the hyper-parameters: ours, ours_short, ours_several, ours_near,
-            ours_chains, subgoals, paper, or the domain's own.
+            ours_chains, ours_kept_chains, subgoals, paper, or the domain's own.
         changes: Settings to change, by dotted name, as ``{"exploration.rollouts": 16}``; or texts
             as on the command line.
         steps: Environment steps per shortcut; None for those of the settings.

@@ -52,8 +52,9 @@ class TrainOptions:
             help="Hyper-parameters: ours, ours_short (ends as soon as plans get no shorter), "
             "ours_several (more shortcuts, also for random goals), ours_near (explores with pushes "
             "at objects, and beyond what operators reach), ours_chains (clones two skills in a "
-            "row, made shorter), subgoals (one policy for several shortcuts), paper (the paper's), "
-            "or the name of the domain's own."
+            "row, made shorter), ours_kept_chains (the same of skills and shortcuts of --keep), "
+            "subgoals (one policy for several shortcuts), paper (the paper's), or the name of the "
+            "domain's own."
         ),
     ] = "ours"
     keep: Annotated[

@@ -7,7 +7,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
-LATER = ("horizon", "anywhere")  # settings that came later, which change nothing where not given
+LATER = (
+    "horizon",
+    "anywhere",
+    "disturbed",
+    "disturbance",
+)  # settings that came later, which change nothing where not given
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,9 @@ class ShortcutCloningSettings:
             are for those of :class:`~slap_ros.shortcuts.sampling.Sampling`.
         anywhere: Whether a start is drawn from all places where operators lead on by the shortcut,
             and not taken after the same operators each time.
+        disturbed: Number of times that each execution is made again with noise, to learn how to
+            come back to it.
+        disturbance: Standard deviation of that noise, of actions from -1 to 1.
     """
 
     straightened: int = 120
@@ -45,6 +53,8 @@ class ShortcutCloningSettings:
     total_steps: int = 4_000
     horizon: int = 1
     anywhere: bool = False
+    disturbed: int = 0
+    disturbance: float = 0.2
 
     @property
     def rollout_steps(self) -> int:

@@ -21,6 +21,7 @@ from slap_ros.errors import InvalidParameterError, SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
+from slap_ros.relational.state import Array
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.observation_encoder import (
     ObservationEncoder,
@@ -29,7 +30,11 @@ from slap_ros.shortcuts.observation_encoder import (
 )
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, restore_starts, shortest_paths
-from slap_ros.shortcuts.straightening import ChainExecutor, Straightener
+from slap_ros.shortcuts.straightening import (
+    ChainExecutor,
+    StraightenedExecution,
+    Straightener,
+)
 
 MOST_ORDERS = 24  # of the objects in an observation that are learned from
 MOST_WAYS = 4  # ways from a start to its target that are executed until one gets there
@@ -88,6 +93,37 @@ class Demonstrated(NamedTuple):
     shortest: int
 
 
+@dataclass(frozen=True)
+class Disturbances:
+    """Noise with which demonstrations are made again, to learn how to come back to them.
+
+    Args:
+        number: Number of times that each is made again.
+        scale: Standard deviation of the noise, of actions from -1 to 1.
+        seed: Seed of the noise.
+    """
+
+    number: int = 0
+    scale: float = 0.0
+    seed: int = 0
+
+    def of(self, straightener: Straightener, actions: Array) -> Iterator[StraightenedExecution]:
+        """Yield the executions that reach the target in spite of noise.
+
+        Args:
+            straightener: Straightener at the start of the demonstration.
+            actions: Actions of the demonstration, shape (steps, actions).
+        """
+        rng = np.random.default_rng([self.seed, len(actions)])
+        for _ in range(self.number):
+            noise = rng.normal(scale=self.scale, size=(len(actions), straightener.displacements))
+            if (execution := straightener.come_back(actions, noise)) is not None:
+                yield execution
+
+
+UNDISTURBED = Disturbances()
+
+
 def demonstrate(
     domain: Domain,
     record: StartRecord,
@@ -138,7 +174,10 @@ def _ways(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
 
 
 def demonstrated(
-    domain: Domain, signature: Signature, demonstrations: Sequence[ShortcutDemonstration]
+    domain: Domain,
+    signature: Signature,
+    demonstrations: Sequence[ShortcutDemonstration],
+    disturbances: Disturbances = UNDISTURBED,
 ) -> Demonstrated:
     """Make demonstrations again in the model, to see what a policy observes in them.
 
@@ -146,6 +185,7 @@ def demonstrated(
         domain: Domain of the demonstrations.
         signature: Signature of the shortcut.
         demonstrations: Demonstrations of the shortcut, one at least.
+        disturbances: Noise with which each is made again some more times.
 
     Returns:
         The steps of those that end in the target again, once for each order of the objects of a
@@ -159,12 +199,14 @@ def demonstrated(
     for start, shown in zip(starts, demonstrations, strict=True):
         encoder = ObservationEncoder(domain, start.space, signature, start.change)
         whole = np.array(shown.actions)
-        again = Straightener(domain, encoder, start.state).execute(whole)
+        straightener = Straightener(domain, encoder, start.state)
+        again = straightener.execute(whole)
         if again is None:
             continue
-        seen = State.batch(again.states[:-1])
-        observations.append(encoder.encode(seen).observations)
-        actions.append(again.actions)
+        for execution in (again, *disturbances.of(straightener, again.actions)):
+            seen = State.batch(execution.states[:-1])
+            observations.append(encoder.encode(seen).observations)
+            actions.append(execution.actions)
     if not actions:
         raise InvalidParameterError(
             f"no demonstration of {signature.name} ends in its target again; remove the work "

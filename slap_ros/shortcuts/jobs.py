@@ -23,7 +23,9 @@ from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.mlp_policy import ObservationNormalisation
 from slap_ros.shortcuts.demonstrations import (
+    UNDISTURBED,
     Demonstrated,
+    Disturbances,
     ShortcutDemonstration,
     demonstrate,
     demonstrated,
@@ -337,7 +339,12 @@ class LearningAttempt:
         """Steps of the demonstrations to learn from; None where there are none."""
         if not self.demonstrations:
             return None
-        return demonstrated(self.distribution.make_domain(), self.signature, self.demonstrations)
+        cloning = self.settings.cloning
+        disturbances = UNDISTURBED
+        if cloning is not None and cloning.disturbed:
+            disturbances = Disturbances(cloning.disturbed, cloning.disturbance, self.seed)
+        domain = self.distribution.make_domain()
+        return demonstrated(domain, self.signature, self.demonstrations, disturbances)
 
     def plan_lengths(self, learner: SavableLearner) -> PlanLengths | None:
         """The validations while the shortcut is learned; None where no rule asks for them.

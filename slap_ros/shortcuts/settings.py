@@ -20,7 +20,6 @@ from slap_ros.shortcuts.sac_settings import ShortcutSacSettings
 from slap_ros.shortcuts.sampling import DEFAULT, PAPER, Sampling
 from slap_ros.shortcuts.stopping import Stopping
 
-
 OTHER_WAYS = (
     "also_repeat",
     "pushes",
@@ -283,6 +282,16 @@ _CHAINS: Mapping[str, SettingValue] = {
     "starts": 200,
     "horizon": 60,
 }
+KEPT_CHAINS = "ours_kept_chains"  # the same of skills and of shortcuts that a training keeps
+_KEPT_CHAINS: Mapping[str, SettingValue] = {
+    **_CHAINS,
+    "exploration.regrasps": True,
+    "exploration.along_plan": True,
+    "cloning.disturbed": 4,
+    "cloning.epochs": 40,
+    "starts": 400,
+    "shortcuts": 2,
+}
 SUBGOALS = "subgoals"  # settings that learn one policy for several shortcuts
 _SUBGOALS: Mapping[str, SettingValue] = {"together": 4, "attempts": 1}
 SAC = "sac"  # settings that learn with SAC in the place of PPO
@@ -298,6 +307,7 @@ _VARIANTS = {
     SHORT: _SHORT,
     NEAR: _NEAR,
     CHAINS: _CHAINS,
+    KEPT_CHAINS: _KEPT_CHAINS,
     SUBGOALS: _SUBGOALS,
     SAC: _SAC,
     ABSTRACT_HER: _ABSTRACT_HER,

@@ -157,6 +157,44 @@ class Straightener:
         """
         return self._reach(self._start, actions)
 
+    def come_back(self, actions: Array, noise: Array) -> StraightenedExecution | None:
+        """Act with noise, and say in each step what leads back to the execution without any.
+
+        Displacements add up, so what noise has added is what is to be taken back (as in DART,
+        Laskey et al. 2017, where a supervisor says it).
+
+        Args:
+            actions: Actions of a policy that reach the target from the start, from -1 to 1, shape
+                (steps, actions).
+            noise: Noise on displacements, shape (steps, displacements).
+
+        Returns:
+            The execution, with what would have led back in the place of what was done; None where
+            the target is not reached.
+        """
+        self._world.reset(self._start)
+        states, back, off = [self._start], actions.copy(), np.zeros(len(self._axes))
+        done = actions.copy()
+        for step in range(len(actions)):
+            wanted = np.clip(actions[step, self._axes] - off, -1.0, 1.0)
+            back[step, self._axes] = wanted
+            done[step, self._axes] = np.clip(wanted + noise[step], -1.0, 1.0)
+            off += done[step, self._axes] - actions[step, self._axes]
+            states.append(self._world.step(self._encoder.action_map(done[step])))
+            self.steps += 1
+            batch = states[-1].alone()
+            encoding = self._encoder.encode(batch)
+            if self._encoder.success(batch, encoding, self._targets)[0]:
+                return StraightenedExecution(back[: step + 1], tuple(states))
+            if encoding.failure[0]:
+                return None
+        return None
+
+    @property
+    def displacements(self) -> int:
+        """The number of actions that are displacements."""
+        return len(self._axes)
+
     def _reach(self, state: State, actions: Array) -> StraightenedExecution | None:
         """The execution from any state on, up to the target; None where that is not reached."""
         self._world.reset(state)

@@ -17,6 +17,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.shortcuts.demonstrations import ShortcutDemonstration, demonstrate, demonstrated
 from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.observation_encoder import uses_gripper
 from slap_ros.shortcuts.settings import CHAINS, ExplorationSettings, training_settings
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
@@ -117,6 +118,24 @@ def test_a_shortcut_without_gripper_is_not_shown_by_skills_that_need_it(pegs):
     assert all(chains.straighten(task.initial_state, 0, pair, 1, rng) is None for pair in pairs)
 
 
+def test_a_shortcut_that_takes_and_releases_on_the_way_has_the_gripper(pegs):
+    task = pegs.task(SEED, 0)
+    problem = Problem.of(pegs, task.initial_state)
+    space = problem.model.space
+    goal = space.mask(task.goal)
+    graph = build_abstract_graph(space.abstract(task.initial_state), goal, problem.operators)
+    chains = StraightenedChains(pegs, problem, graph, regrasps=True)
+    pair = next(chains.leading_from(0))  # Pick, then Insert
+    signature = chains.signature(0, pair)
+    assert signature.regrasps
+    assert uses_gripper(pegs, signature)
+    assert not uses_gripper(pegs, replace(signature, regrasps=False))
+    assert Signature.from_json(signature.as_json()) == signature
+    assert signature.name != replace(signature, regrasps=False).name
+    found = chains.straighten(task.initial_state, 0, pair, 5, np.random.default_rng(0))
+    assert space.abstract(found.states[-1]) & goal  # one peg is in its hole, and the hand is empty
+
+
 @pytest.fixture(scope="module")
 def stowing():
     """A task with two hammers and two drawers, after Open and Pick."""
@@ -157,8 +176,8 @@ def test_an_execution_that_ends_in_motion_goes_on_until_nothing_moves(stowing):
 
 
 def test_what_skills_show_with_one_object_is_not_asked_for_with_all_at_once(stowing):
-    hammers, space, graph, chains, _, (_, pick, _, close) = stowing
-    signature = chains.signature(pick.target, close.target)
+    hammers, space, graph, chains, _, (opening, pick, place, close) = stowing
+    signature = chains.signature(pick.target, (place, close))
     assert signature.counted
     assert Signature.from_json(signature.as_json()) == signature
     at_large = replace(signature, counted=False)
@@ -173,13 +192,14 @@ def test_what_skills_show_with_one_object_is_not_asked_for_with_all_at_once(stow
     both = Change.between(graph.nodes[pick.target], graph.nodes[targets(at_large)[0]])
     assert at_large.matches(both, graph.nodes[pick.target], space)
     assert not signature.matches(both, graph.nodes[pick.target], space)
-    assert not chains.signature(0, pick.target).counted  # a hand holds one hammer anyway
-    assert "counted" not in chains.signature(0, pick.target).as_json()
+    one = chains.signature(0, (opening, pick))
+    assert not one.counted  # a hand holds one hammer anyway
+    assert "counted" not in one.as_json()
 
 
 def test_starts_are_drawn_from_wherever_the_shortcut_leads_on(stowing):
-    hammers, _, _, chains, _, (_, pick, *_) = stowing
-    signature, steps = chains.signature(0, pick.target), {"Open": 40, "Pick": 40}
+    hammers, _, _, chains, _, (opening, pick, *_) = stowing
+    signature, steps = chains.signature(0, (opening, pick)), {"Open": 40, "Pick": 40}
     records = [
         find_start(hammers, SEED, TASK, signature, None, steps, False, np.random.default_rng(i))
         for i in range(4)

@@ -123,4 +123,5 @@ TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
         # The arm holds the wiper in one of two configurations; some attempts learn one alone.
         "attempts": 3,
     },
+    "ours_kept_chains": {"starts": 200},  # the sweep is tried out in each, which takes its time
 }

@@ -212,4 +212,5 @@ TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
     },
     # With search in the model, plans are as short after the first stage as after the second.
     "ours_several": {"polish": None, "shortcuts": 4},
+    "ours_kept_chains": {"starts": 1_000},  # a slap and a skill: each start has another tower
 }

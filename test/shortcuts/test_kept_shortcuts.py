@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Shortcuts of an earlier training: options like any other in a later one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import SequentialWorkers
+from slap_ros.shortcuts.demonstrations import demonstrate
+from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
+from slap_ros.shortcuts.settings import CHAINS, ExplorationSettings, training_settings
+from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.shortcuts.starts import find_start
+from slap_ros.shortcuts.training import Training
+from slap_ros.skills.domain_choice import DomainChoice
+
+SEED, TASK = 1_000_000, 10_000  # of a task for training
+FEW = ExplorationSettings(tasks=1, rollouts=1, length=1, nodes=1, straightened=10, along_plan=True)
+
+
+@pytest.fixture(scope="module")
+def tower():
+    return get_domain("obstacle_tower")
+
+
+@pytest.fixture(scope="module")
+def kept(tower):
+    return KeptShortcuts(load_library(Path("models/shortcuts/obstacle_tower"), tower).shortcuts)
+
+
+@pytest.fixture(scope="module")
+def candidates(tower, kept):
+    rng = np.random.default_rng(0)
+    return Explorer.of_task(tower, SEED, 0, FEW, rng, kept).explore().candidates
+
+
+def test_a_slap_and_a_skill_show_a_shortcut_together(kept, candidates):
+    (slap,) = kept.shortcuts
+    (found,) = [one for one in candidates if slap.name in one.replaced]
+    assert found.replaced == (slap.name, "PlaceInTarget")
+    assert found.operator_path == ("Pick",)
+    assert found.plan_steps < 50  # the plan is one with the slap
+    assert 0 < found.expected_saving < found.plan_steps
+
+
+def test_it_is_demonstrated_from_where_the_slap_begins(tower, kept, candidates):
+    (found,) = [one for one in candidates if one.replaced[-1] == "PlaceInTarget"]
+    start = find_start(
+        tower, SEED, TASK, found.signature, found.operator_path, {"Pick": 17.0}, kept=kept
+    )
+    shown = demonstrate(tower, start, found.signature, 40, np.random.default_rng(0), kept)
+    assert 0 < len(shown.actions) < shown.replaced
+    without = demonstrate(tower, start, found.signature, 40, np.random.default_rng(0))
+    assert without is None or without.replaced > 1.5 * shown.replaced  # block by block
+
+
+def test_a_library_has_what_is_kept_and_a_work_folder_is_for_that_alone(tmp_path):
+    domain = get_domain("obstacle2d")
+    (first, second, *_) = load_library(Path("models/shortcuts/obstacle2d"), domain).shortcuts
+    base = training_settings(CHAINS, domain)
+    nothing = replace(FEW, straightened=0)
+    settings = replace(base, exploration=nothing, validation=4, shortcuts=1)
+    tasks = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)
+
+    def train(kept):
+        workers, silent = SequentialWorkers(), Silent()
+        return Training(tasks, settings, tmp_path / "work", workers, silent, kept).run()
+
+    library = train((first,))
+    assert library.shortcuts == (first,)
+    assert library.record["kept"] == {"digest": library.digest, "shortcuts": [first.name]}
+    validation = library.record["validation"]
+    assert validation["slap"] <= validation["pure_planning"]
+    assert library.record["environment_steps"]["learning"] == 0  # of this training
+    for others in ((second,), (first, second), ()):
+        with pytest.raises(InvalidParameterError, match="other settings"):
+            train(others)
+
+
+class Silent:
+    """Receives the events of a training."""
+
+    def on_progress(self, what, done, total):
+        pass
+
+    def on_left_out(self, use, index, reason):
+        pass
+
+    def on_ranked(self, ranked):
+        pass
+
+    def on_learning(self, name, folder, total_steps):
+        pass
+
+    def on_validated(self, name, before, after, kept):
+        pass
