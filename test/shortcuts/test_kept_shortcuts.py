@@ -12,12 +12,14 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
-from slap_ros.shortcuts.demonstrations import demonstrate
+from slap_ros.shortcuts.demonstrations import Disturbances, demonstrate, demonstrated
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.settings import CHAINS, ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut_library import load_library
-from slap_ros.shortcuts.starts import find_start
+from slap_ros.shortcuts.starts import find_start, restore_starts
+from slap_ros.shortcuts.straightening import Straightener
 from slap_ros.shortcuts.training import Training
 from slap_ros.skills.domain_choice import DomainChoice
 
@@ -50,15 +52,54 @@ def test_a_slap_and_a_skill_show_a_shortcut_together(kept, candidates):
     assert 0 < found.expected_saving < found.plan_steps
 
 
-def test_it_is_demonstrated_from_where_the_slap_begins(tower, kept, candidates):
+@pytest.fixture(scope="module")
+def start(tower, kept, candidates):
     (found,) = [one for one in candidates if one.replaced[-1] == "PlaceInTarget"]
-    start = find_start(
-        tower, SEED, TASK, found.signature, found.operator_path, {"Pick": 17.0}, kept=kept
-    )
-    shown = demonstrate(tower, start, found.signature, 40, np.random.default_rng(0), kept)
+    about = found.signature, found.operator_path, {"Pick": 17.0}
+    return find_start(tower, SEED, TASK, *about, kept=kept), found.signature
+
+
+@pytest.fixture(scope="module")
+def shown(tower, kept, start):
+    return demonstrate(tower, *start, 40, np.random.default_rng(0), kept)
+
+
+def test_it_is_demonstrated_from_where_the_slap_begins(tower, start, shown):
     assert 0 < len(shown.actions) < shown.replaced
-    without = demonstrate(tower, start, found.signature, 40, np.random.default_rng(0))
+    without = demonstrate(tower, *start, 40, np.random.default_rng(0))
     assert without is None or without.replaced > 1.5 * shown.replaced  # block by block
+
+
+def test_what_noise_has_added_is_taken_back(tower, start, shown):
+    record, signature = start
+    (where,) = restore_starts(tower, [record])
+    encoder = ObservationEncoder(tower, where.space, signature, where.change)
+    straightener = Straightener(tower, encoder, where.state)
+    actions = np.array(shown.actions)
+    silent = straightener.come_back(actions, np.zeros((len(actions), straightener.displacements)))
+    assert silent.actions == pytest.approx(actions)
+    noise = np.zeros((len(actions), straightener.displacements))
+    noise[0] = -0.1 * np.sign(actions[0, : straightener.displacements])  # once, within the limits
+    disturbed = straightener.come_back(actions, noise)
+    assert disturbed.actions[1] != pytest.approx(actions[1])
+    assert np.abs(disturbed.actions).max() <= 1.0
+    joints = encoder.robot_columns[: straightener.displacements]
+    off = [
+        np.abs(after.data[joints] - before.data[joints]).max()
+        for after, before in zip(disturbed.states, silent.states, strict=False)
+    ]
+    assert off[1] > 0.0
+    assert off[-1] < 0.5 * off[1]  # joints that are at full speed get back later
+
+
+def test_disturbed_demonstrations_are_learned_from_as_well(tower, start, shown):
+    _, signature = start
+    once = demonstrated(tower, signature, [shown])
+    again = demonstrated(tower, signature, [shown], Disturbances(3, 0.1, seed=1))
+    assert len(again.actions) > len(once.actions)
+    assert again.shortest == once.shortest
+    same = demonstrated(tower, signature, [shown], Disturbances(3, 0.1, seed=1))
+    assert np.array_equal(same.actions, again.actions)
 
 
 def test_a_library_has_what_is_kept_and_a_work_folder_is_for_that_alone(tmp_path):
