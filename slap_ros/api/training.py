@@ -81,8 +81,8 @@ def train(
             ``if __name__ == "__main__"``.
         ray: Address of a Ray cluster to run on instead, or ``local``.
         callback: Receiver of the events of training.
-        keep: Library of an earlier training. Its shortcuts are options like any other in this one,
-            and part of the new library. None for no such library.
+        keep: Library of an earlier training, whose shortcuts are options like any other in this
+            one, and part of the new library; None for none.
 
     Returns:
         The library, which :func:`plan` takes as ``shortcuts``.
@@ -90,31 +90,35 @@ def train(
     Raises:
         NoSkillsError: The domain has no skills to begin with.
         InvalidParameterError: Torch is not installed, or a setting cannot be what it is to be.
-        InvalidLibraryError: The library to keep is damaged, or another domain's.
-        SkillsChangedError: It was learned over other skills.
+        InvalidLibraryError, SkillsChangedError: The library to keep is damaged, another domain's,
+            or was learned over other skills.
         BusyError: Another process trains in the same folder.
     """
     require_skills(domain)
     require_whole("seed", seed)
     chosen = chosen_settings(domain, settings, changes, steps)
     kept = () if keep is None else _shortcuts_to_keep(Path(keep), domain)
-    library_folder, work_folder = Path(folder), training_folder(folder, work)
-    for place in (library_folder, work_folder):
+    work_folder = training_folder(folder, work)
+    for place in (Path(folder), work_folder):
         require_writable(place)
     require_torch()
-    choice = DomainChoice.opened_as(domain)
-    distribution = TaskDistribution(choice, seed)
-    watched = callback if callback is not None else Unwatched()
+    choice, watched = DomainChoice.opened_as(domain), callback or Unwatched()
+    tasks = TaskDistribution(choice, seed)
     with sole_use(work_folder), some_workers(jobs, ray) as workers:
         kind = SubgoalTraining if chosen.together > 1 else Training
-        library = kind(distribution, chosen, work_folder, workers, watched, kept).run()
+        library = kind(tasks, chosen, work_folder, workers, watched, kept).run()
     command = train_command(choice, seed, settings, steps, change_texts(changes), keep)
+    library = _with_origin(library, command, domain)
+    save_library(Path(folder), library)
+    return library
+
+
+def _with_origin(library: ShortcutLibrary, command: str, domain: Domain) -> ShortcutLibrary:
+    """The library, whose record begins with the command that made it, and over which skills."""
     made_by: dict[str, Any] = {"command": command}
     if acquired := describe_skills(domain):
         made_by["skills"] = acquired
-    library = replace(library, record={**made_by, **library.record})
-    save_library(library_folder, library)
-    return library
+    return replace(library, record={**made_by, **library.record})
 
 
 def training_folder(library: Path | str, work: Path | str | None) -> Path:

@@ -35,12 +35,14 @@ ZERO_TOO = frozenset(
         "refinements",
         "shortcuts",
         "straightened",
+        "disturbed",
     }
 )
 BELOW_1 = math.nextafter(1.0, 0.0)
 RANGES: Mapping[str, tuple[float, float]] = {  # least and greatest value; all others are finite
     "acting": (0.0, 1.0),
     "cloning": (0.0, sys.float_info.max),
+    "disturbance": (0.0, sys.float_info.max),
     "gamma": (0.0, BELOW_1),
     "enough": (0.0, 1.0),
     "ent_coef_init": (math.ulp(0.0), sys.float_info.max),

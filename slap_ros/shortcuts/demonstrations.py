@@ -94,7 +94,7 @@ class Demonstrated(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Disturbances:
+class NoisyRepetitions:
     """Noise with which demonstrations are made again, to learn how to come back to them.
 
     Args:
@@ -121,7 +121,7 @@ class Disturbances:
                 yield execution
 
 
-UNDISTURBED = Disturbances()
+NOT_REPEATED = NoisyRepetitions()
 
 
 def demonstrate(
@@ -177,7 +177,7 @@ def demonstrated(
     domain: Domain,
     signature: Signature,
     demonstrations: Sequence[ShortcutDemonstration],
-    disturbances: Disturbances = UNDISTURBED,
+    repetitions: NoisyRepetitions = NOT_REPEATED,
 ) -> Demonstrated:
     """Make demonstrations again in the model, to see what a policy observes in them.
 
@@ -185,7 +185,7 @@ def demonstrated(
         domain: Domain of the demonstrations.
         signature: Signature of the shortcut.
         demonstrations: Demonstrations of the shortcut, one at least.
-        disturbances: Noise with which each is made again some more times.
+        repetitions: Noise with which each is made again some more times.
 
     Returns:
         The steps of those that end in the target again, once for each order of the objects of a
@@ -203,7 +203,7 @@ def demonstrated(
         again = straightener.execute(whole)
         if again is None:
             continue
-        for execution in (again, *disturbances.of(straightener, again.actions)):
+        for execution in (again, *repetitions.of(straightener, again.actions)):
             seen = State.batch(execution.states[:-1])
             observations.append(encoder.encode(seen).observations)
             actions.append(execution.actions)

@@ -23,9 +23,9 @@ from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.mlp_policy import ObservationNormalisation
 from slap_ros.shortcuts.demonstrations import (
-    UNDISTURBED,
+    NOT_REPEATED,
     Demonstrated,
-    Disturbances,
+    NoisyRepetitions,
     ShortcutDemonstration,
     demonstrate,
     demonstrated,
@@ -340,11 +340,11 @@ class LearningAttempt:
         if not self.demonstrations:
             return None
         cloning = self.settings.cloning
-        disturbances = UNDISTURBED
+        repetitions = NOT_REPEATED
         if cloning is not None and cloning.disturbed:
-            disturbances = Disturbances(cloning.disturbed, cloning.disturbance, self.seed)
+            repetitions = NoisyRepetitions(cloning.disturbed, cloning.disturbance, self.seed)
         domain = self.distribution.make_domain()
-        return demonstrated(domain, self.signature, self.demonstrations, disturbances)
+        return demonstrated(domain, self.signature, self.demonstrations, repetitions)
 
     def plan_lengths(self, learner: SavableLearner) -> PlanLengths | None:
         """The validations while the shortcut is learned; None where no rule asks for them.

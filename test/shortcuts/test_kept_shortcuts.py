@@ -12,7 +12,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
-from slap_ros.shortcuts.demonstrations import Disturbances, demonstrate, demonstrated
+from slap_ros.shortcuts.demonstrations import NoisyRepetitions, demonstrate, demonstrated
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
@@ -95,10 +95,10 @@ def test_what_noise_has_added_is_taken_back(tower, start, shown):
 def test_disturbed_demonstrations_are_learned_from_as_well(tower, start, shown):
     _, signature = start
     once = demonstrated(tower, signature, [shown])
-    again = demonstrated(tower, signature, [shown], Disturbances(3, 0.1, seed=1))
+    again = demonstrated(tower, signature, [shown], NoisyRepetitions(3, 0.1, seed=1))
     assert len(again.actions) > len(once.actions)
     assert again.shortest == once.shortest
-    same = demonstrated(tower, signature, [shown], Disturbances(3, 0.1, seed=1))
+    same = demonstrated(tower, signature, [shown], NoisyRepetitions(3, 0.1, seed=1))
     assert np.array_equal(same.actions, again.actions)
 
 
