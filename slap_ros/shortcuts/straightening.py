@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slap_ros.core import Domain
-from slap_ros.errors import SkillNotApplicableError
+from slap_ros.errors import InvalidStateError, SkillNotApplicableError
 from slap_ros.planning.abstract_graph import Edge
 from slap_ros.planning.options import OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State
@@ -197,7 +197,10 @@ class Straightener:
 
     def _reach(self, state: State, actions: Array) -> StraightenedExecution | None:
         """The execution from any state on, up to the target; None where that is not reached."""
-        self._world.reset(state)
+        try:
+            self._world.reset(state)
+        except InvalidStateError:  # pressed in so far that nothing can begin there
+            return None
         states = [state]
         for step, command in enumerate(self._encoder.action_map(actions)):
             states.append(self._world.step(command))
