@@ -323,6 +323,7 @@ class _Beyond:
         self._nodes, self._depth = list(graph.nodes), list(graph.depth)
         self._index = {abstract: i for i, abstract in enumerate(graph.nodes)}
         self._found: list[tuple[EdgeBeyond, int]] = []  # edges, each with the node it leads to
+        self._goals_again: dict[int, int] = {}  # by abstract states, which the graph has as well
 
     def add(self, beyond: Sequence[EdgeBeyond]) -> None:
         """Layer by layer, as the graph was built; then what leads to no goal is dropped."""
@@ -348,12 +349,17 @@ class _Beyond:
         """Note an edge that leads to a later node; the number of that node if it is new."""
         if self._is_goal(edge.source):
             return None
-        target = self._index.get(edge.abstract)
+        index = self._index
+        target = index.get(edge.abstract)
+        if target is not None and target < self._old <= edge.source and self._is_goal(target):
+            # Forward edges lead to later nodes. So a goal is a node once more, after all of them.
+            index = self._goals_again
+            target = index.get(edge.abstract)
         new = target is None
         if target is None:
             if len(self._nodes) >= self._max_nodes:
                 return None
-            target = self._index[edge.abstract] = len(self._nodes)
+            target = index[edge.abstract] = len(self._nodes)
             self._nodes.append(edge.abstract)
             self._depth.append(depth)
         if target >= self._old and target > edge.source:
