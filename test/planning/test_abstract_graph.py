@@ -116,14 +116,29 @@ def test_a_goal_beyond_the_graph_is_added():
 
 
 def test_operators_lead_on_from_beyond_the_graph():
-    """To a goal state that is there already: no edge leads back, so that paths are finite."""
     away = bits(6)
-    assert counted((0, away, "leap")) == ([], [], [])
     back = [*COUNTING, operator("from6", [6], [3, 9], [6])]
     nodes, depth, edges = counted((0, away, "leap"), operators=back)
     assert nodes == [away, bits(3, 9)]
     assert depth == [1, 2]
     assert edges == [(0, 4, "leap"), (4, 5, "from6")]
+
+
+def test_a_goal_that_is_there_already_is_a_node_once_more():
+    """No edge leads back, so that paths are finite; and a way to it is not lost."""
+    away, other = bits(6), bits(6, 9)
+    assert counted((0, away, "leap")) == (
+        [away, bits(3)],
+        [1, 2],
+        [(0, 4, "leap"), (4, 5, "from6")],
+    )
+    both = [*COUNTING, DOWN, operator("from69", [6, 9], [3], [6, 9])]
+    nodes, _, edges = counted((0, away, "leap"), (0, other, "jump"), operators=both)
+    assert nodes.count(bits(3)) == 1  # once for all ways
+    assert {name for _, target, name in edges if nodes[target - 4] == bits(3)} == {
+        "from6",
+        "from69",
+    }
 
 
 def test_no_path_beyond_has_more_edges_than_the_graph_is_deep():

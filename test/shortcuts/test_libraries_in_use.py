@@ -17,7 +17,11 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import Experiment, run_all
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.options import OptionKind
+from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts import shipped
+from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.sampling import DEFAULT, Sampling
 from slap_ros.shortcuts.shipped import chosen_library, require_usable, shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
@@ -289,3 +293,22 @@ def test_a_shortcut_leads_beyond_the_graph_whatever_another_does_within():
     pure, alone, together = results(task, slap, both)
     assert alone.plan.predicted_steps < pure.plan.predicted_steps
     assert together.plan.predicted_steps <= alone.plan.predicted_steps
+
+
+def test_the_rest_of_a_plan_is_as_short_where_it_is_planned_again_on_the_way():
+    """With the wiper in the hand, operators reach what the sweep leads to in twelve more edges."""
+    domain = get_domain("cleanup_table")
+    task = domain.task(300)
+    problem, state = Problem.of(domain, task.initial_state), task.initial_state
+    goal = problem.model.space.mask(task.goal)
+    shortcuts = load_library(shipped_library(domain.name), domain).shortcuts
+    grounded = GroundedShortcuts(domain, shortcuts, state)
+    planner = GraphPlanner(problem, shortcuts=grounded)
+    plan = planner.plan(state, goal).plan
+    kinds = [edge.option.kind for edge in plan.edges]
+    assert OptionKind.SHORTCUT in kinds[2:]
+    left = plan.predicted_steps
+    for edge in plan.edges[:-1]:
+        state = problem.model.roll_out(edge.option, state, edge.target).final
+        left -= edge.predicted_steps
+        assert planner.plan(state, goal).plan.predicted_steps <= left
