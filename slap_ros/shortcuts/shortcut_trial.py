@@ -85,35 +85,56 @@ class TrialWorlds:
         return range(0, rollouts, self.at_once)
 
 
+class _TrialStart:
+    """The state in which all rollouts of a trial begin, and what is known of it, found out once."""
+
+    def __init__(self, worlds: TrialWorlds, encoder: ObservationEncoder, state: State) -> None:
+        """Abstract the state.
+
+        Args:
+            worlds: Worlds in which rollouts begin.
+            encoder: Encoder for the change to be made.
+            state: State to begin in.
+        """
+        self.worlds, self.encoder, self._state = worlds, encoder, state
+        self.target = encoder.change.apply(encoder.space.abstract(state))
+        self._encodings: dict[int, tuple[State, Encoding]] = {}
+
+    def begin(self, count: int) -> VectorWorld:
+        """See :meth:`TrialWorlds.begin`."""
+        return self.worlds.begin(self._state, count)
+
+    def encoded(self, count: int) -> tuple[State, Encoding]:
+        """The state so many times, as a batch, and its encoding.
+
+        Args:
+            count: Number of rollouts that are stepped together.
+        """
+        if count not in self._encodings:
+            data = np.repeat(self._state.data[None], count, axis=0)
+            states = State(self._state.layout, data)
+            self._encodings[count] = states, self.encoder.encode(states)
+        return self._encodings[count]
+
+
 class RolloutBatch:
     """Rollouts from one state, step by step, in worlds that are stepped together."""
 
-    def __init__(
-        self,
-        worlds: TrialWorlds,
-        encoder: ObservationEncoder,
-        state: State,
-        act: Actor,
-        limit: int,
-        count: int = 1,
-    ) -> None:
-        """Begin in ``state``.
+    def __init__(self, start: _TrialStart, act: Actor, limit: int, count: int = 1) -> None:
+        """Begin where all rollouts of the trial do.
 
         Args:
-            worlds: Gives the worlds with the first step, so that other rollouts may end before.
-            encoder: Encoder for the change to be made.
-            state: State to begin in.
+            start: Gives the worlds with the first step, so that other rollouts may end before.
             act: Gives the actions of each step.
             limit: Environment steps of a rollout at most.
             count: Number of rollouts.
         """
-        self._begin = partial(worlds.begin, state, count)
+        self._begin = partial(start.begin, count)
         self._worlds: VectorWorld | None = None
-        self._encoder, self._act = encoder, act
-        self._limit, self._enough = limit, worlds.sampling.alternatives
-        self._targets = [encoder.change.apply(encoder.space.abstract(state))] * count
-        self.states = State(state.layout, np.repeat(state.data[None], count, axis=0))
-        self._encoding = encoder.encode(self.states)
+        self._encoder, self._act = start.encoder, act
+        self._limit, self._enough = limit, start.worlds.sampling.alternatives
+        self._targets = [start.target] * count
+        self.states, self._encoding = start.encoded(count)
         self._alive = np.ones(count, dtype=bool)
         self._past: list[tuple[State, Weights]] = []
         self.reached: list[ShortcutRollout] = []
@@ -202,13 +223,11 @@ class ShortcutTrial:
             limit: Environment steps of a rollout at most.
         """
         self._worlds, self._sampling, self._rng = worlds, worlds.sampling, rng
-        self._encoder, self._state, self._limit = encoder, state, limit
+        self._start, self._limit = _TrialStart(worlds, encoder, state), limit
         scale = np.linspace(1.0, MAX_NOISE_SCALE, worlds.at_once, dtype=np.float32)
         temperature = (self._sampling.temperature * scale)[:, None]
         self._sample = _observing(policy.sampler(rng, temperature))
-        self._deterministic = _DeterministicRollout(
-            RolloutBatch(worlds, encoder, state, _mean(policy), limit)
-        )
+        self._deterministic = _DeterministicRollout(RolloutBatch(self._start, _mean(policy), limit))
         self._noisy = self._batch(self._sample, limit)  # the first of them
 
     def lasts(self, steps: int) -> bool:
@@ -262,8 +281,7 @@ class ShortcutTrial:
             best.add(self._batch(script, best.limit(len(middle))).run())
 
     def _batch(self, act: Actor, limit: int) -> RolloutBatch:
-        count = self._worlds.at_once
-        return RolloutBatch(self._worlds, self._encoder, self._state, act, limit, count)
+        return RolloutBatch(self._start, act, limit, self._worlds.at_once)
 
 
 class _DeterministicRollout:

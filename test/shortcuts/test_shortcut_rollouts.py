@@ -66,6 +66,21 @@ def test_each_rollout_does_in_a_world_of_its_own_what_it_says():
     assert seen > 6
 
 
+def test_a_beginning_is_encoded_once_however_many_rollouts_begin_in_it(monkeypatch):
+    encoder, state = next(situations())
+    encoded, encode = [], ObservationEncoder.encode
+
+    def remembered(encoder, states):
+        encoded.append(states.data)
+        return encode(encoder, states)
+
+    monkeypatch.setattr(ObservationEncoder, "encode", remembered)
+    apart = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=None))
+    assert successes(apart, SAMPLING, encoder, state)
+    assert sum(np.array_equal(data[0], state.data) for data in encoded) == 1
+    assert len(encoded) > 10
+
+
 def same(one, other):
     """Whether successes are the same to the bit."""
     pairs = list(zip(one, other, strict=True))
