@@ -71,8 +71,7 @@ def train(
         domain: Domain to train in, as :func:`make` makes it.
         folder: Folder that the library is saved to.
         seed: Seed of all random numbers.
-        settings: Name of the hyper-parameters: ours, ours_short, ours_several, ours_near,
-            ours_chains, ours_kept_chains, subgoals, paper, or the domain's own.
+        settings: Name of the hyper-parameters, as ``slap train --help`` has them.
         changes: Settings to change, by dotted name, as ``{"exploration.rollouts": 16}``; or texts
             as on the command line.
         steps: Environment steps per shortcut; None for those of the settings.
@@ -81,8 +80,7 @@ def train(
             ``if __name__ == "__main__"``.
         ray: Address of a Ray cluster to run on instead, or ``local``.
         callback: Receiver of the events of training.
-        keep: Library of an earlier training, whose shortcuts are options like any other in this
-            one, and part of the new library; None for none.
+        keep: Library of an earlier training, whose shortcuts are used and kept; None for none.
 
     Returns:
         The library, which :func:`plan` takes as ``shortcuts``.
