@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -172,23 +172,14 @@ class Straightener:
             The execution, with what would have led back in the place of what was done; None where
             the target is not reached.
         """
-        self._world.reset(self._start)
-        states, back, off = [self._start], actions.copy(), np.zeros(len(self._axes))
-        done = actions.copy()
-        for step in range(len(actions)):
-            wanted = np.clip(actions[step, self._axes] - off, -1.0, 1.0)
+        done, back, off = actions.copy(), actions.copy(), np.zeros(len(self._axes))
+        for step, planned in enumerate(actions[:, self._axes]):
+            wanted = np.clip(planned - off, -1.0, 1.0)
             back[step, self._axes] = wanted
             done[step, self._axes] = np.clip(wanted + noise[step], -1.0, 1.0)
-            off += done[step, self._axes] - actions[step, self._axes]
-            states.append(self._world.step(self._encoder.action_map(done[step])))
-            self.steps += 1
-            batch = states[-1].alone()
-            encoding = self._encoder.encode(batch)
-            if self._encoder.success(batch, encoding, self._targets)[0]:
-                return StraightenedExecution(back[: step + 1], tuple(states))
-            if encoding.failure[0]:
-                return None
-        return None
+            off += done[step, self._axes] - planned
+        reached = self.execute(done)
+        return None if reached is None else replace(reached, actions=back[: reached.steps])
 
     @property
     def displacements(self) -> int:

@@ -105,12 +105,19 @@ def test_a_demonstration_is_shorter_than_the_skills_and_ends_in_the_target(pegs,
     assert learned_from.shortest == len(shown.actions)
 
 
-def test_a_shortcut_without_gripper_is_not_shown_by_skills_that_need_it(pegs):
+@pytest.fixture(scope="module")
+def graphed(pegs):
+    """A task with pegs, its problem, and its graph."""
     task = pegs.task(SEED, 0)
     problem = Problem.of(pegs, task.initial_state)
     space = problem.model.space
     goal = space.mask(task.goal)
     graph = build_abstract_graph(space.abstract(task.initial_state), goal, problem.operators)
+    return task, problem, graph
+
+
+def test_a_shortcut_without_gripper_is_not_shown_by_skills_that_need_it(pegs, graphed):
+    task, problem, graph = graphed
     chains = StraightenedChains(pegs, problem, graph)
     pairs = list(chains.leading_from(0))  # Pick, then Insert: afterwards the hand is empty again
     assert pairs
@@ -118,12 +125,8 @@ def test_a_shortcut_without_gripper_is_not_shown_by_skills_that_need_it(pegs):
     assert all(chains.straighten(task.initial_state, 0, pair, 1, rng) is None for pair in pairs)
 
 
-def test_a_shortcut_that_takes_and_releases_on_the_way_has_the_gripper(pegs):
-    task = pegs.task(SEED, 0)
-    problem = Problem.of(pegs, task.initial_state)
-    space = problem.model.space
-    goal = space.mask(task.goal)
-    graph = build_abstract_graph(space.abstract(task.initial_state), goal, problem.operators)
+def test_a_shortcut_that_takes_and_releases_on_the_way_has_the_gripper(pegs, graphed):
+    task, problem, graph = graphed
     chains = StraightenedChains(pegs, problem, graph, regrasps=True)
     pair = next(chains.leading_from(0))  # Pick, then Insert
     signature = chains.signature(0, pair)
@@ -133,7 +136,9 @@ def test_a_shortcut_that_takes_and_releases_on_the_way_has_the_gripper(pegs):
     assert Signature.from_json(signature.as_json()) == signature
     assert signature.name != replace(signature, regrasps=False).name
     found = chains.straighten(task.initial_state, 0, pair, 5, np.random.default_rng(0))
-    assert space.abstract(found.states[-1]) & goal  # one peg is in its hole, and the hand is empty
+    assert (
+        problem.model.space.abstract(found.states[-1]) & graph.goal
+    )  # one peg is in its hole, and the hand is empty
 
 
 @pytest.fixture(scope="module")
