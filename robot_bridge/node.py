@@ -30,7 +30,8 @@ ROS Parameters:
     position_noise (double, 0.002), turn_noise (double, 0.01): standard deviation of detections
         along each axis in m, about each axis in rad.
     hidden_after (int, 0): pictures in a row that show others but not an object, after which it is
-        taken to be where it was at rest; 0: never.
+        taken to be where it was at rest, and not to be there if none has shown it before a task
+        begins; 0: never.
     settle_time (double, 1.5): s to wait for what moves to come to rest.
     joint_timeout (double, 0.5): s without joint positions after which the robot holds.
     detection_timeout (double, 2.0): s without a complete measurement after which it holds.
@@ -86,6 +87,7 @@ from slap_ros.core import Action, Task
 from slap_ros.errors import (
     BusyError,
     InvalidStateError,
+    NoDetectionError,
     NoJointStateError,
     SlapError,
 )
@@ -251,12 +253,11 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     def _start(self) -> None:
         try:
-            state = self._robot.world.measure(self._since_s)
-        except InvalidStateError as error:
+            state = self._robot.world.measure_first(self._since_s)
+            if state is not None:
+                self._begin(state)
+        except (InvalidStateError, NoDetectionError) as error:
             self.get_logger().warning(f"not yet: {error}", throttle_duration_sec=1.0)
-            return
-        if state is not None:
-            self._begin(state)
 
     def _reset(self, request: ResetTask.Request) -> None:
         if request.initial_state.objects:
@@ -265,17 +266,26 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             )
         if self._phase is Phase.MOVING:
             raise BusyError("the arm moves: cancel the task first")
-        state = self._robot.world.measure(self._since_s)
+        world = self._robot.world
+        state = world.measure_first(self._since_s)
         if state is None:
             self._robot.require_joints()
             raise self._robot.no_detection(
                 self._since_s, f"within {self._settings.detection_timeout} s"
             )
-        self._goal = decode_goal(request.goal, self._domain.atom_space(state))
+        space = self._domain.atom_space(world.scene_config.template)
+        self._goal = decode_goal(request.goal, space)
         self._begin(state)
 
     def _begin(self, state: State) -> None:
-        goal = frozenset(self._goal) or self._domain.default_goal(state)
+        world = self._robot.world
+        goal = frozenset(self._goal) or world.default_goal(state)
+        world.require_seen(goal)
+        if world.left_out:
+            self.get_logger().warning(
+                f"no picture shows {', '.join(world.left_out)}: the task is solved without; once "
+                "it is seen, reset_task takes it in"
+            )
         self._forget_commands()
         self._enter(Phase.READY)
         self._open_episode(Task(state, goal, self._domain.step_limit))

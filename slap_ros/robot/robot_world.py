@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
@@ -24,11 +24,13 @@ from slap_ros.errors import (
     InvalidMeasurementError,
     InvalidParameterError,
     InvalidStateError,
+    NoDetectionError,
     OpenLoopOnlyError,
     UnsafeCommandError,
 )
 from slap_ros.geometry.pose import Pose
-from slap_ros.relational import Object, State
+from slap_ros.perception.percept import known_part
+from slap_ros.relational import GroundAtom, Object, State
 from slap_ros.robot.grasp_tracking import (
     GRASPED,
     expected_pose,
@@ -38,10 +40,11 @@ from slap_ros.robot.grasp_tracking import (
 )
 from slap_ros.robot.hidden_objects import PredictedMotion, pushed_aside
 from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.known_scene import KnownScene
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
 from slap_ros.robot.line_of_sight import Ways, is_slanted
 from slap_ros.robot.scene_config import SceneConfig
-from slap_ros.robot.state_assembly import Grasp, StateAssembler, feature_values
+from slap_ros.robot.state_assembly import Grasp, feature_values
 from slap_ros.robot.tracking import (
     LONGEST,
     Detection,
@@ -112,15 +115,9 @@ class RobotWorld:
 
     def __post_init__(self) -> None:
         _require_panda(self.domain, self.limits)
-        template = self.scene_config.template
-        (self._robot,) = template.layout.of_type(ROBOT)
-        world = self.domain.make_world(template)
-        if not isinstance(world, PandaWorld):
-            raise InvalidParameterError(f"the world of {self.domain.name} has no Panda")
-        self._model = world  # where commands are tried, and states checked
-        self._bodies = [template.layout.object(body.name) for body in world.scene.free]
+        self._scene = KnownScene.of(self.domain, self.scene_config.template)
         self._tracks = {obj: Track(self.tracking) for obj in self.scene_config.detected}
-        self._assembler = StateAssembler(template, world.scene)
+        self._left_out: frozenset[Object] = frozenset()  # of a task: no picture showed them
         self._frames = {
             how.frame: (obj, how)
             for obj, frames in self.scene_config.detected.items()
@@ -133,7 +130,6 @@ class RobotWorld:
         self._lost = False  # what was held: the gripper is to be opened
         self._state: State | None = None
         self._measured: State | None = None  # the state before those that are expected
-        self._space = self.domain.atom_space(template)
         self._predicted: PredictedMotion | None = None  # since the state, where objects may hide
 
     # -- measurements ---------------------------------------------------------------------------
@@ -207,7 +203,7 @@ class RobotWorld:
     def undetected(self, since_s: float) -> list[str]:
         """Names of the objects that were not detected since then, held ones left out."""
         held = self._grasp.obj if self._grasp is not None else None
-        return [o.name for o, t in self._tracks.items() if o != held and t.newest_s <= since_s]
+        return [o.name for o, t in self._followed if o != held and t.newest_s <= since_s]
 
     def what_is_missing(self, since_s: float) -> str:
         """What was not detected since then, in words, and what to do about what is hidden."""
@@ -225,11 +221,73 @@ class RobotWorld:
         held = self._grasp.obj if self._grasp is not None else None
         return [
             o.name
-            for o, t in self._tracks.items()
+            for o, t in self._followed
             if o != held and t.newest_s > since_s and t.estimate(since_s) is None
         ]
 
     # -- the state ------------------------------------------------------------------------------
+
+    @property
+    def left_out(self) -> list[str]:
+        """Names of the objects that the task lacks, since no picture had shown them."""
+        return sorted(obj.name for obj in self._left_out)
+
+    def measure_first(self, since_s: float, moving: bool = False) -> State | None:
+        """The state in which a task begins: without objects that no picture has ever shown.
+
+        A task that is not about them can be solved all the same (SLAP D.4).
+
+        Args:
+            since_s: Time at which the arm came to rest, s.
+            moving: See :meth:`measure`.
+
+        Returns:
+            The state; None while measurements are missing, or something moves.
+
+        Raises:
+            InvalidStateError: As :meth:`measure`.
+        """
+        never = (obj for obj, track in self._tracks.items() if track.newest_s == -math.inf)
+        self._leave_out(obj for obj in never if self._is_hidden(self._tracks[obj], since_s))
+        return self.measure(since_s, moving)
+
+    def default_goal(self, state: State) -> frozenset[GroundAtom]:
+        """The goal of a task that has none of its own, whether what it is about was seen or not.
+
+        Args:
+            state: The state in which the task begins.
+        """
+        template = self.scene_config.template
+        return self.domain.default_goal(state.over(template.layout, template))
+
+    def require_seen(self, goal: Iterable[GroundAtom]) -> None:
+        """Refuse a goal about objects that were left out.
+
+        Raises:
+            NoDetectionError: It is about one.
+        """
+        about = {obj for atom in goal for obj in atom.objects}
+        if missing := sorted(obj.name for obj in about & self._left_out):
+            raise NoDetectionError(
+                f"the goal is about what no picture has shown yet: {', '.join(missing)}: move what "
+                "is in front of it, or the camera"
+            )
+
+    def _leave_out(self, objects: Iterable[Object]) -> None:
+        template = self.scene_config.template
+        known = known_part(template, {obj.name for obj in objects})
+        left_out = frozenset(template.objects) - frozenset(known.objects)
+        if left_out == self._left_out:
+            return
+        self._scene.model.close()
+        self._scene = KnownScene.of(self.domain, known)
+        self._left_out = left_out
+        self._state = self._measured = self._predicted = None  # of other objects
+
+    @property
+    def _followed(self) -> list[tuple[Object, Track]]:
+        """The objects of the task that are detected."""
+        return [(obj, t) for obj, t in self._tracks.items() if obj not in self._left_out]
 
     def measure(self, since_s: float, moving: bool = False) -> State | None:
         """The state since the arm came to rest, once measured.
@@ -274,7 +332,7 @@ class RobotWorld:
             yield Doubt(predicted=True)
         if not (moving and self.tracking.hidden_after):
             return
-        moved = {obj: self._tracks[obj].strayed(since_s) for obj in self._tracks}
+        moved = {obj: track.strayed(since_s) for obj, track in self._followed}
         for obj in sorted(moved, key=lambda obj: -moved[obj]):
             if moved[obj] > 0.0:
                 yield Doubt(seen=obj)
@@ -285,21 +343,21 @@ class RobotWorld:
         reading = self._reading
         if reading is None or reading.stamp_s <= since_s or not reading.at_rest:
             return None
-        hidden = {o for o, t in self._tracks.items() if o == covered or self._is_hidden(t, since_s)}
+        hidden = {o for o, t in self._followed if o == covered or self._is_hidden(t, since_s)}
         estimates = self._estimates(reading, since_s, hidden)
         held = self._grasp.obj if self._grasp is not None else None
         known = {o: s for o, s in estimates.items() if s is not None and o != held}
-        if len(known) < len(self._tracks) - (held is not None):
+        if len(known) < len(self._followed) - (held is not None):
             return None
         if not moving and not self._settled(estimates, since_s):
             return None
         if self._grasp is not None:
             self._grasp = grasp_as_seen(self._grasp, reading, estimates.get(self._grasp.obj))
-        state = self._assembler.assemble(reading, known, self._grasp)
+        state = self._scene.assembler.assemble(reading, known, self._grasp)
         if aside := self._pushed_aside(state, known, hidden & known.keys()):
             known |= aside
-            state = self._assembler.assemble(reading, known, self._grasp)
-        self._model.reset(state)
+            state = self._scene.assembler.assemble(reading, known, self._grasp)
+        self._scene.model.reset(state)
         for obj, estimate in known.items():
             self._tracks[obj].remember(estimate)
         self._state = self._measured = state
@@ -309,7 +367,7 @@ class RobotWorld:
     def _pushed_aside(
         self, state: State, known: Mapping[Object, PoseEstimate], hidden: Collection[Object]
     ) -> dict[Object, PoseEstimate]:
-        free = zip(self._bodies, self._model.scene.free, strict=True)
+        free = zip(self._scene.bodies, self._scene.model.scene.free, strict=True)
         bodies = {obj: body for obj, body in free if obj in known}
         moved = pushed_aside(state, bodies, hidden) if hidden else {}
         return {obj: still(pose, known[obj].weight) for obj, pose in moved.items()}
@@ -323,7 +381,7 @@ class RobotWorld:
             self._tracks[grasp.obj].expect(expected_pose(grasp, reading))
         estimates = {
             obj: self._hidden(obj, track) if obj in hidden else track.estimate(since_s)
-            for obj, track in self._tracks.items()
+            for obj, track in self._followed
         }
         if grasp is not None and is_lost(grasp, reading, estimates.get(grasp.obj)):
             self._grasp, self._lost = None, True
@@ -366,14 +424,14 @@ class RobotWorld:
         """
         if self._state is None or self._measured is None:
             raise InvalidStateError("nothing is measured yet")
-        self._model.reset(self._state)
-        after = self._model.step(action)
-        start = feature_values(self._state, self._robot, JOINT_FEATURES)
-        target = self._model.joints_off_fixed_bodies(tuple(start), PRESSED, HIGHEST)
+        self._scene.model.reset(self._state)
+        after = self._scene.model.step(action)
+        start = self._joints(self._state)
+        target = self._scene.model.joints_off_fixed_bodies(tuple(start), PRESSED, HIGHEST)
         if self.tracking.hidden_after:
             actions = self.domain.action_space
-            self._predicted = PredictedMotion.of(self._model, actions, self._state, after)
-        moved = self.joint_distance(feature_values(self._measured, self._robot, JOINT_FEATURES))
+            self._predicted = PredictedMotion.of(self._scene.model, actions, self._state, after)
+        moved = self.joint_distance(self._joints(self._measured))
         if moved > DRIFT:
             raise UnsafeCommandError(
                 f"the arm was moved by {moved:.3f} rad since it was measured: call reset_task"
@@ -393,28 +451,31 @@ class RobotWorld:
         """
         before, after = self._state, command.after
         assert before is not None
-        moved = command.motion.target == tuple(feature_values(after, self._robot, JOINT_FEATURES))
+        moved = command.motion.target == tuple(self._joints(after))
         if not moved or command.gripper is not GripperAction.KEEP or self._disturbs(before, after):
             return None
-        if self._space.abstract(after) != self._space.abstract(before):
+        if self._scene.space.abstract(after) != self._scene.space.abstract(before):
             return None
         self._state = after
         return after
 
+    def _joints(self, state: State) -> list[float]:
+        return feature_values(state, self._scene.robot, JOINT_FEATURES)
+
     def _disturbs(self, before: State, after: State) -> bool:
         """Whether an object moves, or begins to, that the arm does not carry."""
         held = self._grasp.obj if self._grasp is not None else None
-        loose = (obj for obj in after.objects if obj not in (self._robot, held))
+        loose = (obj for obj in after.objects if obj not in (self._scene.robot, held))
         return any(tuple(before[obj]) != tuple(after[obj]) for obj in loose)
 
     def _grip(self, after: State) -> GripperAction:
-        held = [obj for obj in self._bodies if after.get(obj, "held") > 0.5]
+        held = [obj for obj in self._scene.bodies if after.get(obj, "held") > 0.5]
         if self._grasp is None and held:
-            x, y, z, *turn = feature_values(after, self._robot, GRASP_FEATURES)
+            x, y, z, *turn = feature_values(after, self._scene.robot, GRASP_FEATURES)
             qx, qy, qz, qw = turn
-            finger = float(after.get(self._robot, "finger"))
+            finger = float(after.get(self._scene.robot, "finger"))
             pose = Pose((x, y, z), (qx, qy, qz, qw))
-            body = self._model.scene.free[self._bodies.index(held[0])]
+            body = self._scene.model.scene.free[self._scene.bodies.index(held[0])]
             self._candidate = Grasp(held[0], pose, finger, narrowest_width(body, pose))
             return GripperAction.CLOSE
         if self._lost or (self._grasp is not None and not held):
@@ -446,7 +507,7 @@ class RobotWorld:
 
     def close(self) -> None:
         """Release the model's resources."""
-        self._model.close()
+        self._scene.model.close()
 
 
 def require_robot(domain: Domain, initial: State) -> None:

@@ -286,6 +286,18 @@ def test_the_ensemble_solves_a_task_by_horizons(network, tmp_path, goal):
     assert found.states == metrics.plan_length + 1
 
 
+def test_a_task_is_solved_without_what_no_picture_shows(network, tmp_path):
+    bag = tmp_path / "bag"
+    robot, bridge = {"hidden": "block5"}, PATIENT | {"hidden_after": 5}
+    chosen = settings(robot, bridge, bag, goal="(Holding robot block4)")
+    metrics = run(RunRequest(chosen, timeout_s=600, in_process=True), lambda *_: None)
+    assert metrics.success, metrics.error_msg
+    states = [item.message for item in read_bag(bag) if item.type_name == STATE]
+    assert states
+    assert not any(obj.name == "block5" for message in states for obj in message.objects)
+    assert evaluate_bag(bag).states == metrics.plan_length + 1
+
+
 @on_both_robots
 def test_an_object_that_is_never_seen_is_named(network, world):
     with lab({"hidden": "block2"}, started=False, world=world) as bench:

@@ -14,6 +14,7 @@ from slap_ros.errors import (
     InvalidParameterError,
     InvalidSceneError,
     InvalidStateError,
+    NoDetectionError,
     UnsafeCommandError,
 )
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -305,6 +306,36 @@ def test_what_pictures_do_not_show_is_where_it_was_where_that_is_asked_for():
     since = bench.now
     bench.measure()
     assert bench.robot_world.measure(since)[block][:2] == pytest.approx((0.3, -0.3), abs=0.003)
+
+
+def test_a_task_lacks_what_no_picture_has_shown_and_its_goal_must_not_be_about_that():
+    bench = Bench(tracking=TrackingSettings(hidden_after=5))
+    robot_world, block = bench.robot_world, TASK.initial_state.layout.object("block1")
+    bench.measure(times=4, without=("block1",))
+    assert robot_world.measure_first(0.0) is None  # it may only have been missed
+    bench.measure(without=("block1",))
+    state = robot_world.measure_first(0.0)
+    assert set(TASK.initial_state.objects) - set(state.objects) == {block}
+    goal = robot_world.default_goal(state)
+    assert goal == TASK.goal
+    with pytest.raises(NoDetectionError, match="no picture has shown yet: block1"):
+        robot_world.require_seen(goal)
+    after = robot_world.plan_command(STEPS).after
+    assert after.layout == state.layout
+
+    since = bench.now
+    bench.measure()  # it is seen, but the task is under way
+    assert robot_world.measure(since).layout == state.layout
+    whole = robot_world.measure_first(since)
+    assert whole.layout == TASK.initial_state.layout
+    assert not robot_world.left_out
+    robot_world.require_seen(goal)
+
+
+def test_without_a_camera_a_task_waits_for_what_was_never_seen():
+    bench = Bench()
+    bench.measure(times=40, without=("block2",))
+    assert bench.robot_world.measure_first(0.0) is None
 
 
 def test_a_block_that_is_let_go_and_hidden_is_where_the_hand_had_it(lifted):

@@ -9,6 +9,7 @@ measure, so a step is not a function of it: use it to execute plans, not to plan
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from slap_ros.core import Action, Domain
@@ -18,7 +19,7 @@ from slap_ros.errors import (
     InvalidStateError,
     NoDetectionError,
 )
-from slap_ros.relational import State
+from slap_ros.relational import GroundAtom, State
 from slap_ros.robot.finger_tracking import FingerTracker
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
@@ -94,7 +95,7 @@ class ClosedLoopWorld:
         self._robot = RobotWorld(domain, self._detector.config, settings.limits, settings.tracking)
         self._arm, self._fingers = TrajectoryTracker(self.plant.joints), FingerTracker()
         self._detected_s = self.plant.time_s
-        self._state = self._measured(self.plant.time_s)
+        self._state = self._measured(self.plant.time_s, self._robot.measure_first)
 
     @property
     def state(self) -> State:
@@ -118,8 +119,16 @@ class ClosedLoopWorld:
         command = self._robot.plan_command(action)
         self._actuate(command.gripper)
         self._move(command.motion)
-        self._state = self._measured(self.plant.time_s)
+        self._state = self._measured(self.plant.time_s, self._robot.measure)
         return self._state
+
+    def require_seen(self, goal: Iterable[GroundAtom]) -> None:
+        """Refuse a goal about what no picture showed when the task began.
+
+        Raises:
+            NoDetectionError: It is about such an object.
+        """
+        self._robot.require_seen(goal)
 
     def close(self) -> None:
         """Release what the core of the bridge and the detector use."""
@@ -159,13 +168,13 @@ class ClosedLoopWorld:
             if outcome is not None:
                 return
 
-    def _measured(self, since_s: float) -> State:
+    def _measured(self, since_s: float, measure: Callable[[float, bool], State | None]) -> State:
         """The state since a time, s, once it is known."""
         settings, invalid = self._settings, ""
         while (waited := self.plant.time_s - since_s) <= settings.detection_timeout_s:
             if self._pass_period():
                 try:
-                    state = self._robot.measure(since_s, waited > settings.settle_time_s)
+                    state = measure(since_s, waited > settings.settle_time_s)
                 except InvalidStateError as error:
                     invalid = str(error)
                     continue

@@ -40,9 +40,9 @@ loop runs as behind the bridge: an arm that lags follows each command, fingers h
 what the pictures say once everything is at rest is the next state. Length is the number of
 environment steps executed, mean ± sample standard deviation over solved tasks. Relative length is
 the mean over that of pure planning by camera, on tasks that both solved. Success is that the goal's
-atoms hold in the state that was measured. A block that no first picture shows makes a task that is
-not solved (NO_DETECTION). A plan that begins with a held block on something begins as if the block
-were lifted off it. Nothing was trained again."""
+atoms hold in the state that was measured. A block that no first picture shows is left out of the
+task; a task about it is not solved (NO_DETECTION). A plan that begins with a held block on
+something begins as if the block were lifted off it. Nothing was trained again."""
 
 
 def study(comparison: Comparison) -> StudyReport:

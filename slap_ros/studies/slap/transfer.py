@@ -170,14 +170,15 @@ def solve_on_robot(
     """
     domain = open_domain(replace(setup.choice, measured=True))
     task = domain.task(seed, index)
-    space = domain.atom_space(task.initial_state)
     try:
         world = make(domain, task.initial_state)
     except SlapError as error:  # nothing was measured
         return Trial.of(seed, index, _ended_by(error))
-    goal, perceiver = space.mask(task.goal), ExactPerceiver(space, changing=True)
     try:
-        planner = setup.make_planner(domain, task.initial_state)
+        world.require_seen(task.goal)
+        space = domain.atom_space(world.state)
+        planner = setup.make_planner(domain, world.state)
+        goal, perceiver = space.mask(task.goal), ExactPerceiver(space, changing=True)
         episode = Executor(
             domain, planner, world, space, goal, task.step_limit, perceiver=perceiver
         ).run()
