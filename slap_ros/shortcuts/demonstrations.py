@@ -107,14 +107,17 @@ class NoisyRepetitions:
     scale: float = 0.0
     seed: int = 0
 
-    def of(self, straightener: Straightener, actions: Array) -> Iterator[StraightenedExecution]:
+    def of(
+        self, straightener: Straightener, actions: Array, place: int
+    ) -> Iterator[StraightenedExecution]:
         """Yield the executions that reach the target in spite of noise.
 
         Args:
             straightener: Straightener at the start of the demonstration.
             actions: Actions of the demonstration, shape (steps, actions).
+            place: Place of the demonstration among all: each has a noise of its own.
         """
-        rng = np.random.default_rng([self.seed, len(actions)])
+        rng = np.random.default_rng([self.seed, place])
         for _ in range(self.number):
             noise = rng.normal(scale=self.scale, size=(len(actions), straightener.displacements))
             if (execution := straightener.come_back(actions, noise)) is not None:
@@ -196,14 +199,14 @@ def demonstrated(
     """
     observations, actions = [], []
     starts = restore_starts(domain, [shown.start for shown in demonstrations])
-    for start, shown in zip(starts, demonstrations, strict=True):
+    for place, (start, shown) in enumerate(zip(starts, demonstrations, strict=True)):
         encoder = ObservationEncoder(domain, start.space, signature, start.change)
         whole = np.array(shown.actions)
         straightener = Straightener(domain, encoder, start.state)
         again = straightener.execute(whole)
         if again is None:
             continue
-        for execution in (again, *repetitions.of(straightener, again.actions)):
+        for execution in (again, *repetitions.of(straightener, again.actions, place)):
             seen = State.batch(execution.states[:-1])
             observations.append(encoder.encode(seen).observations)
             actions.append(execution.actions)

@@ -100,6 +100,9 @@ def test_disturbed_demonstrations_are_learned_from_as_well(tower, start, shown):
     assert again.shortest == once.shortest
     same = demonstrated(tower, signature, [shown], NoisyRepetitions(3, 0.1, seed=1))
     assert np.array_equal(same.actions, again.actions)
+    twice = demonstrated(tower, signature, [shown, shown], NoisyRepetitions(3, 0.1, seed=1))
+    second = twice.actions[len(again.actions) :]  # of the same length, with other noise
+    assert not np.array_equal(second, again.actions[: len(second)])
 
 
 def test_a_library_has_what_is_kept_and_a_work_folder_is_for_that_alone(tmp_path):
