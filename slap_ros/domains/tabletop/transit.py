@@ -38,6 +38,7 @@ from slap_ros.worlds.panda import grasp_pose
 
 CLEARANCE = 0.05  # m, over a place before the approach and after the retreat
 HIGHER = 2.0 * CLEARANCE  # m, where things as high as what is held stand close to the place
+LOWER = 0.4 * CLEARANCE  # m, where something is in the way further up
 SEED = 0  # of motion plans: a plan is a function of the state alone
 ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
@@ -183,16 +184,19 @@ class TransitCandidate:
 def _retreat(scene: PlanningScene, state: State) -> Path | None:
     """Straight up, where the fingers or the body in them are still close to something.
 
-    Higher, where one cannot cross from there: shortcuts leave a hand deep between things.
+    Higher or less high, where one cannot cross from there: shortcuts leave a hand deep between
+    things, or beside what it touches again further up.
     """
     q = joints_of(state)
     if scene.checker(state, held_margin=RELAXED)(q[None])[0]:
         return q[None]
-    low = _up(q, CLEARANCE)
-    if low is None or _free(scene, state)(low[-1:])[0]:
-        return low
-    high = _up(q, HIGHER)
-    return high if high is not None and _free(scene, state)(high[-1:])[0] else low
+    usual = _up(q, CLEARANCE)
+    if usual is None:
+        return None
+    for up in (usual, *(_up(q, height) for height in (HIGHER, LOWER))):
+        if up is not None and _free(scene, state)(up[-1:])[0]:
+            return up
+    return usual
 
 
 def _up(q: Joints, height: float) -> Path | None:
