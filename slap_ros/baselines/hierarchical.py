@@ -55,6 +55,7 @@ METHOD = Method(
             n_steps=16,
             batch_size=64,
             learning_rate=1e-3,
+            ent_coef=0.0,
             total_steps=300_000,
         ),
         "paper": replace(PAPER, total_steps=1_000_000),

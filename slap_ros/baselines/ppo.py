@@ -37,7 +37,8 @@ class TaskPpoSettings:
     validation: int = 20  # tasks on which it is decided whether the policy acts with its noise
 
 
-OURS = TaskPpoSettings()
+# Of entropies 0, .01 and .05 (Obstacle 2D, seed 0), the only one that solves a validation task.
+OURS = TaskPpoSettings(ent_coef=0.05)
 PAPER = TaskPpoSettings(n_envs=1, n_steps=2048, batch_size=16, ent_coef=0.05)
 
 
