@@ -45,6 +45,7 @@ def rise(state):
         (0.05, 4, 0.0),  # nothing is near
         (0.002, 2, CLEARANCE),  # over the tower's top after that
         (0.002, 1, 2 * CLEARANCE),  # with a finger still beside its top block after the first
+        (0.002, 0, 3 * CLEARANCE),
     ],
 )
 def test_the_hand_rises_until_it_can_go_across(gap, blocks_up, expected):
