@@ -118,7 +118,7 @@ TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
         "horizon": 30,
     },
     # As its library was trained: a chain serves some tasks, and saves little over fewer.
-    "ours_kept_chains": {"least_saving": 0.005, "validation": 48, "shortcuts": 4},
+    "ours_kept_chains": {"least_saving": 0.005, "validation": 48, "shortcuts": 8},
     "paper": {
         "exploration.rollouts": 1000,
         "exploration.length": 100,
