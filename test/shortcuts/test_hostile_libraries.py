@@ -84,6 +84,7 @@ def with_value(path, value):
         (with_value("shortest", 1e308), "shortest"),
         (with_value("horizon", 0), "tried out"),
         (with_value("record", [1]), "damaged"),
+        (with_value("activation", "sinh"), "activation"),
     ],
 )
 def test_a_shortcut_that_says_odd_things_of_itself(library, change, why):

@@ -15,7 +15,13 @@ from slap_ros.relational import Target
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.sampling import DEFAULT, Sampling
 from slap_ros.shortcuts.shooting import RandomActions
-from slap_ros.shortcuts.shortcut_library import load_library, load_shortcut, save_shortcut
+from slap_ros.shortcuts.shortcut_library import (
+    ShortcutLibrary,
+    load_library,
+    load_shortcut,
+    save_library,
+    save_shortcut,
+)
 from slap_ros.shortcuts.shortcut_rollouts import MAX_NET_FAILURES, ShortcutRollouts
 from slap_ros.shortcuts.signature import Change
 
@@ -170,6 +176,21 @@ def test_a_batch_finds_a_way_at_least_as_short():
         for sampling in (few, many)
     ]
     assert sums[1] < sums[0]
+
+
+def test_a_library_keeps_how_a_policy_is_run(tmp_path):
+    """SAC's are, otherwise than PPO's: as PPO's, the same weights would do something else."""
+    squashed = replace(SHORTCUT.policy, activation="relu", squashed=True)
+    learned = {"sac": replace(SHORTCUT, policy=squashed), "ppo": SHORTCUT}
+    libraries = {name: ShortcutLibrary(DOMAIN.name, (one,)) for name, one in learned.items()}
+    for name, library in libraries.items():
+        save_library(tmp_path / name, library)
+        (read,) = load_library(tmp_path / name, DOMAIN).shortcuts
+        seen = np.linspace(-1.0, 1.0, read.policy.normalisation.mean.size, dtype=np.float32)[None]
+        assert np.array_equal(read.policy.mean(seen), learned[name].policy.mean(seen))
+        text = (tmp_path / name / SHORTCUT.name / "shortcut.json").read_text()
+        assert ('"squashed"' in text) == (name == "sac")
+    assert libraries["sac"].digest != libraries["ppo"].digest
 
 
 def test_a_shortcut_that_takes_longer_is_tried_out_for_longer(tmp_path):
