@@ -128,7 +128,9 @@ def test_a_library_has_what_is_kept_and_a_work_folder_is_for_that_alone(tmp_path
             train(others)
 
 
-@pytest.mark.parametrize("name", ["obstacle_tower", "cluttered_drawer", "cleanup_table"])
+@pytest.mark.parametrize(
+    "name", ["obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_table"]
+)
 def test_shipped_chains_are_beside_the_shortcuts_that_they_were_learned_over(name):
     domain = get_domain(name)
     library = load_library(Path(f"models/chains/{name}/shortcuts"), domain)
