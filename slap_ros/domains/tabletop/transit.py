@@ -39,8 +39,7 @@ from slap_ros.worlds.panda import grasp_pose
 CLEARANCE = 0.05  # m, over a place before the approach and after the retreat
 HIGHER = 2.0 * CLEARANCE  # m, where things as high as what is held stand close to the place
 LOWER = 0.4 * CLEARANCE  # m, where something is in the way further up
-# m, where the usual one does not do, in the order in which they are tried; up to beside a tower
-OTHER_RETREATS = (HIGHER, LOWER, 3.0 * CLEARANCE, 4.0 * CLEARANCE)
+RETREATS = (CLEARANCE, HIGHER, LOWER, 3.0 * CLEARANCE, 4.0 * CLEARANCE)  # m, as they are tried
 SEED = 0  # of motion plans: a plan is a function of the state alone
 ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
@@ -192,13 +191,11 @@ def _retreat(scene: PlanningScene, state: State) -> Path | None:
     q = joints_of(state)
     if scene.checker(state, held_margin=RELAXED)(q[None])[0]:
         return q[None]
-    usual = _up(q, CLEARANCE)
-    if usual is None:
-        return None
-    for up in (usual, *(_up(q, height) for height in OTHER_RETREATS)):
+    for height in RETREATS:
+        up = _up(q, height)
         if up is not None and _free(scene, state)(up[-1:])[0]:
             return up
-    return usual
+    return _up(q, CLEARANCE)
 
 
 def _up(q: Joints, height: float) -> Path | None:
