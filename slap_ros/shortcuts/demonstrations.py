@@ -110,12 +110,15 @@ class NoisyRepetitions:
     def of(
         self, straightener: Straightener, actions: Array, place: int
     ) -> Iterator[StraightenedExecution]:
-        """Yield the executions that reach the target in spite of noise.
+        """Make a demonstration again with noise.
 
         Args:
             straightener: Straightener at the start of the demonstration.
             actions: Actions of the demonstration, shape (steps, actions).
             place: Place of the demonstration among all: each has a noise of its own.
+
+        Yields:
+            The executions that reach the target in spite of noise.
         """
         rng = np.random.default_rng([self.seed, place])
         for _ in range(self.number):
