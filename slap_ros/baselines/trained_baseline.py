@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,6 @@ from safetensors.numpy import save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError, InvalidStateError
-from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.library_files import (
     load_policy,
     policy_tensors,
@@ -123,7 +122,7 @@ def save_baseline(path: Path, baseline: TrainedBaseline) -> None:
     """Write a baseline as a folder, in place of the one that may be there."""
 
     def write(folder: Path) -> None:
-        checksum = save_policy(folder / POLICY, baseline.policy)
+        stored = save_policy(folder / POLICY, baseline.policy)
         about = {
             "format": FORMAT,
             "method": baseline.method,
@@ -131,11 +130,9 @@ def save_baseline(path: Path, baseline: TrainedBaseline) -> None:
             "preset": baseline.preset,
             "goal": baseline.goal,
             "environment": dict(baseline.environment),
-            "activation": baseline.policy.activation,
-            "squashed": baseline.policy.squashed,
             "noise": baseline.noise,
             "record": dict(baseline.record),
-            "sha256": checksum,
+            **stored,
         }
         write_object(folder / BASELINE, about)
 
@@ -164,7 +161,7 @@ def load_baseline(path: Path, domain: Domain) -> TrainedBaseline:
             f"{path}: a baseline of domain {about.get('domain')!r}, not of {domain.name!r}"
         )
     try:
-        return _restored(about, load_policy(path / POLICY, str(about["sha256"]), BASELINE))
+        return _restored(about, load_policy(path / POLICY, about, BASELINE))
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise InvalidLibraryError(f"{path / BASELINE}: damaged: {error!r}") from error
 
@@ -173,9 +170,6 @@ def _restored(about: Mapping[str, Any], policy: MlpPolicy) -> TrainedBaseline:
     """The baseline of a file's content; raises where it is not as it was written."""
     goal, noise = about["goal"], float(about["noise"])
     environment = {name: str(about["environment"][name]) for name in ENVIRONMENT}
-    activation = str(about["activation"])
-    if activation not in ACTIVATIONS:
-        raise ValueError(f"unknown activation {activation!r}")
     if not 0.0 <= noise <= MAX_NOISE:
         raise ValueError(f"its noise is {noise:.3g}")
     return TrainedBaseline(
@@ -184,7 +178,7 @@ def _restored(about: Mapping[str, Any], policy: MlpPolicy) -> TrainedBaseline:
         str(about["preset"]),
         None if goal is None else str(goal),
         environment,
-        replace(policy, activation=activation, squashed=bool(about["squashed"])),
+        policy,
         noise,
         dict(about["record"]),
     )

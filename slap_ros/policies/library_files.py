@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,10 +22,12 @@ from safetensors.numpy import load, save
 
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.files import parse_json, read_bytes, read_text
+from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 
 ABOUT = "library.json"
 SKILL, SHORTCUT = "skill.json", "shortcut.json"  # files with facts about a member, by its kind
+TANH = "tanh"  # between the layers of PPO's and of clones
 KINDS = {SKILL: "skills", SHORTCUT: "shortcuts"}
 
 Member = TypeVar("Member")
@@ -93,20 +96,31 @@ def policy_tensors(policy: MlpPolicy) -> dict[str, Weights]:
     return tensors
 
 
-def save_policy(path: Path, policy: MlpPolicy) -> str:
-    """Write a policy, and return its checksum."""
+def run_as(policy: MlpPolicy) -> dict[str, Any]:
+    """How a policy is run, where that is not as PPO's are: older libraries do not say it."""
+    if (policy.activation, policy.squashed) == (TANH, False):
+        return {}
+    return {"activation": policy.activation, "squashed": policy.squashed}
+
+
+def save_policy(path: Path, policy: MlpPolicy) -> dict[str, Any]:
+    """Write a policy's tensors.
+
+    Returns:
+        What else there is to know of it, for the file beside it: how it is run, and a checksum.
+    """
     content = save(policy_tensors(policy))
     path.write_bytes(content)
-    return sha256(content).hexdigest()
+    return {**run_as(policy), "sha256": sha256(content).hexdigest()}
 
 
-def load_policy(path: Path, checksum: str, recorded_in: str) -> MlpPolicy:
+def load_policy(path: Path, about: Mapping[str, Any], recorded_in: str) -> MlpPolicy:
     """Read a policy.
 
     Args:
-        path: Path of the policy's file.
-        checksum: Checksum that the file must have, a sha256 in hexadecimal digits.
-        recorded_in: Name of the file that has the checksum, for messages.
+        path: Path of the file with its tensors.
+        about: Content of the file beside it, with what :func:`save_policy` returned.
+        recorded_in: Name of that file, for messages.
 
     Returns:
         The policy, its tensors of 32-bit floats that are finite and fit together.
@@ -114,6 +128,17 @@ def load_policy(path: Path, checksum: str, recorded_in: str) -> MlpPolicy:
     Raises:
         InvalidLibraryError: It is damaged.
     """
+    beside = path.with_name(recorded_in)
+    if not isinstance(checksum := about.get("sha256"), str):
+        raise InvalidLibraryError(f"{beside}: damaged: it has no checksum (sha256)")
+    if (activation := about.get("activation", TANH)) not in tuple(ACTIVATIONS):
+        raise InvalidLibraryError(f"{beside}: damaged: its activation is {activation!r}")
+    policy = _read_tensors(path, checksum, recorded_in)
+    return replace(policy, activation=activation, squashed=bool(about.get("squashed", False)))
+
+
+def _read_tensors(path: Path, checksum: str, recorded_in: str) -> MlpPolicy:
+    """The policy of a file with this checksum, run as PPO's are."""
     try:
         content = read_bytes(path)
         tensors = load(content)

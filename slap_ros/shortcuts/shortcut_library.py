@@ -28,7 +28,6 @@ from safetensors.numpy import save
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.files import write_whole
-from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.library_files import (
     ABOUT,
     SHORTCUT,
@@ -39,6 +38,7 @@ from slap_ros.policies.library_files import (
     read_members,
     read_object,
     record_of,
+    run_as,
     save_policy,
     write_library,
     write_object,
@@ -52,7 +52,6 @@ from slap_ros.shortcuts.signature import Signature
 FORMAT = 1
 MAX_SHORTEST = 1_000_000  # environment steps; attempts are a multiple of them long
 POLICY = "policy.safetensors"
-TANH = "tanh"  # between the layers of PPO's and of clones
 CHECKED = "checked"  # key of a record: other skills over which the shortcuts were found to hold
 
 Record = Mapping[str, Any]
@@ -82,8 +81,8 @@ class ShortcutLibrary:
         whole = sha256()
         for shortcut in self.shortcuts:
             policy = _learned(shortcut)
-            run_as = f" {policy.activation} {policy.squashed}" if _run_as(policy) else ""
-            whole.update(f"{shortcut.name}{run_as}".encode() + save(policy_tensors(policy)))
+            run = f" {policy.activation} {policy.squashed}" if run_as(policy) else ""
+            whole.update(f"{shortcut.name}{run}".encode() + save(policy_tensors(policy)))
         return whole.hexdigest()[:16]
 
     @property
@@ -197,25 +196,17 @@ def _learned(shortcut: Shortcut) -> MlpPolicy:
 def save_shortcut(folder: Path, shortcut: Shortcut) -> None:
     """Write one shortcut into a folder, which is made where there is none."""
     folder.mkdir(parents=True, exist_ok=True)
-    checksum = save_policy(folder / POLICY, _learned(shortcut))
+    stored = save_policy(folder / POLICY, _learned(shortcut))
     write_object(
         folder / SHORTCUT,
         {
             "signature": shortcut.signature.as_json(),
             "shortest": shortcut.shortest,
             **({"horizon": shortcut.horizon} if shortcut.horizon > 1 else {}),
-            **_run_as(_learned(shortcut)),
             "record": dict(shortcut.record),
-            "sha256": checksum,
+            **stored,
         },
     )
-
-
-def _run_as(policy: MlpPolicy) -> dict[str, Any]:
-    """How a policy is run, where that is not as PPO's are, which older libraries do not say."""
-    if (policy.activation, policy.squashed) == (TANH, False):
-        return {}
-    return {"activation": policy.activation, "squashed": policy.squashed}
 
 
 def load_shortcut(folder: Path) -> Shortcut:
@@ -229,10 +220,6 @@ def load_shortcut(folder: Path) -> Shortcut:
         signature = Signature.from_json(about["signature"])
         shortest, record = int(about["shortest"]), dict(about["record"])
         horizon = int(about.get("horizon", 1))
-        activation, squashed = str(about.get("activation", TANH)), bool(about.get("squashed"))
-        checksum = str(about["sha256"])
-        if activation not in ACTIVATIONS:
-            raise ValueError(f"its activation is {activation!r}")
         if not 1 <= shortest <= MAX_SHORTEST:
             raise ValueError(f"its shortest success has {shortest:.3g} steps")
         if not 1 <= horizon <= MAX_SHORTEST:
@@ -244,6 +231,5 @@ def load_shortcut(folder: Path) -> Shortcut:
             f"{folder}: the signature inside is that of {signature.name}; the folder was renamed "
             "or the file changed"
         )
-    policy = load_policy(folder / POLICY, checksum, SHORTCUT)
-    policy = replace(policy, activation=activation, squashed=squashed)
+    policy = load_policy(folder / POLICY, about, SHORTCUT)
     return Shortcut(signature, policy, shortest, record, horizon)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,6 @@ from safetensors.numpy import save
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError, InvalidLibraryError, InvalidRewardError
 from slap_ros.policies.action_map import ActionMap
-from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.library_files import (
     SKILL,
     load_policy,
@@ -162,7 +161,7 @@ def read_library_record(path: Path) -> dict[str, Any]:
 def save_skill(folder: Path, skill: AcquiredSkill) -> None:
     """Write one skill into a folder, which is made where there is none."""
     folder.mkdir(parents=True, exist_ok=True)
-    checksum = save_policy(folder / POLICY, skill.policy)
+    stored = save_policy(folder / POLICY, skill.policy)
     write_object(
         folder / SKILL,
         {
@@ -170,10 +169,8 @@ def save_skill(folder: Path, skill: AcquiredSkill) -> None:
             "reward": template_data(skill.template),
             "key": signature_of(skill.operator).as_json(),
             "horizon": skill.horizon,
-            "activation": skill.policy.activation,
-            "squashed": skill.policy.squashed,
             "record": dict(skill.record),
-            "sha256": checksum,
+            **stored,
         },
     )
 
@@ -194,20 +191,15 @@ def load_skill(folder: Path, domain: Domain) -> AcquiredSkill:
         template = read_template(about["reward"], operator, domain)
         check_template(template, operator)
         horizon, record = int(about["horizon"]), dict(about["record"])
-        activation, squashed = str(about["activation"]), bool(about["squashed"])
-        checksum = str(about["sha256"])
         if not 1 <= horizon <= MAX_HORIZON:
             raise ValueError(f"its horizon is {horizon:.3g} steps")
-        if activation not in ACTIVATIONS:
-            raise ValueError(f"its activation is {activation!r}")
     except (InvalidDomainError, InvalidRewardError) as error:
         raise InvalidLibraryError(f"{folder / SKILL}: does not fit together: {error}") from error
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InvalidLibraryError(
             f"{folder / SKILL}: damaged, or of another domain than {domain.name}: {error!r}"
         ) from error
-    policy = load_policy(folder / POLICY, checksum, SKILL)
-    policy = replace(policy, activation=activation, squashed=squashed)
+    policy = load_policy(folder / POLICY, about, SKILL)
     skill = AcquiredSkill(operator, template, policy, horizon, record)
     _require_fit(skill, folder, domain)
     return skill
