@@ -73,7 +73,7 @@ class DomainChoice:
                 the domain.
         """
         digest = str(domain.configuration.get(DIGEST_KEY, ""))
-        return cls(domain.name, domain.preset, skills, digest)
+        return cls(domain.name, domain.preset, skills, digest, domain.is_measured)
 
     @classmethod
     def opened_as(cls, domain: Domain) -> DomainChoice:
@@ -86,7 +86,7 @@ class DomainChoice:
         said = domain.configuration
         digest = str(said.get(DIGEST_KEY, ""))
         skills = _OPENED.get(digest, SHIPPED) if digest else str(said.get(SKILLS_KEY, SHIPPED))
-        return cls(domain.name, domain.preset, skills, digest)
+        return cls(domain.name, domain.preset, skills, digest, domain.is_measured)
 
     @property
     def identity(self) -> dict[str, str]:

@@ -163,6 +163,13 @@ def test_what_ships_is_used_unless_told_otherwise(library, shipped):
     assert other in str(refused.value)
 
 
+def test_the_choice_of_a_measured_domain_makes_a_measured_one_again():
+    for choice in (DomainChoice("points"), DomainChoice("points", measured=True)):
+        domain = open_domain(choice)
+        for again in (DomainChoice.of(domain), DomainChoice.opened_as(domain)):
+            assert again.make().is_measured == choice.measured
+
+
 def test_a_library_is_known_by_its_digest_wherever_it_is(library, tmp_path):
     choice = DomainChoice.of(open_domain(DomainChoice("points", skills=str(library))), str(library))
     elsewhere = tmp_path / "elsewhere"
