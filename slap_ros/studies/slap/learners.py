@@ -224,7 +224,7 @@ STUDY = Study(
             "SLAP Table 3",
             "other algorithms that learn shortcuts",
             ("cleanup_table",),
-            {"": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
+            {"cleanup_table": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
         ),
         PaperFigure(
             "SLAP Fig. 6",

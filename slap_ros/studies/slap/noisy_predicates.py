@@ -32,7 +32,7 @@ from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.variations import Variation
 from slap_ros.studies.slap.varying_thresholds import VaryingExecutor
-from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
+from slap_ros.studies.study import PaperFigure, PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -303,12 +303,13 @@ def _plot_means(
 
 
 def summary(found: Data) -> str:
-    """Success of every way to plan in each range, in a few words."""
-    rates: dict[str, list[str]] = {}
+    """Success and steps of every way to plan in each range, in a few words."""
+    figures: dict[str, list[str]] = {}
     for row in found["rows"]:
         within = str(ThresholdRange(row["low"], row["high"], {}))
-        rates.setdefault(within, []).append(f"{row['success_rate']:.0%}")
-    return "; ".join(f"{within}: {' → '.join(both)}" for within, both in rates.items())
+        steps = format_steps(row["plan_length"])
+        figures.setdefault(within, []).append(f"{row['success_rate']:.0%} in {steps}")
+    return "; ".join(f"{within}: {' → '.join(both)} steps" for within, both in figures.items())
 
 
 @dataclass(frozen=True, kw_only=True)
