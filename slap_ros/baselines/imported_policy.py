@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
+from traceback import extract_tb
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -60,8 +61,13 @@ class ImportedPolicy:
         Raises:
             InvalidLibraryError: There is no such function, or what it returns has no ``predict``.
         """
-        environment = {**USUAL, **getattr(_made(source), "environment", {})}
-        return cls(source, domain, preset, environment)
+        chosen = getattr(_made(source), "environment", {})
+        if not isinstance(chosen, Mapping) or not chosen.keys() <= USUAL.keys():
+            raise InvalidLibraryError(
+                f"{source}: its environment is {chosen!r}; it may be a mapping of "
+                f"{', '.join(USUAL)}"
+            )
+        return cls(source, domain, preset, {**USUAL, **chosen})
 
     @property
     def name(self) -> str:
@@ -69,11 +75,27 @@ class ImportedPolicy:
         return self.source
 
     def act(self, observation: Any, rng: np.random.Generator) -> Any:
-        """The action for an observation; see :class:`PredictingPolicy`."""
+        """The action for an observation; see :class:`PredictingPolicy`.
+
+        Raises:
+            InvalidLibraryError: The policy fails, or gives something else than numbers.
+        """
         del rng
-        answer = _made(self.source).predict(observation)
+        try:
+            answer = _made(self.source).predict(observation)
+        except (Exception, SystemExit) as error:  # code of others may raise anything
+            at = extract_tb(error.__traceback__)[-1]
+            raise InvalidLibraryError(
+                f"{self.source}: predict failed: {error!r}, in {Path(at.filename).name}, line "
+                f"{at.lineno}"
+            ) from error
         action = answer[0] if isinstance(answer, tuple) else answer
-        return _as_action(action)
+        try:
+            return _as_action(action)
+        except (TypeError, ValueError) as error:
+            raise InvalidLibraryError(
+                f"{self.source}: predict gave {action!r:.80}, which is no action"
+            ) from error
 
     def require_fit(self, features: int, actions: int) -> None:
         """Nothing is known of it before it acts; an action that does not fit is refused then."""
@@ -82,7 +104,7 @@ class ImportedPolicy:
 def _as_action(action: Any) -> NDArray[np.float64] | int:
     """Numbers of an action, or the number of a skill."""
     numbers = np.asarray(action)
-    return int(numbers) if numbers.ndim == 0 else numbers
+    return int(numbers) if numbers.ndim == 0 else numbers.astype(np.float64)
 
 
 @lru_cache(maxsize=8)

@@ -7,6 +7,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from statistics import fmean
 from time import monotonic
@@ -22,7 +24,7 @@ from slap_ros.baselines.method import (
 )
 from slap_ros.baselines.progress_curve import ProgressCurve
 from slap_ros.baselines.trained_baseline import TrainedBaseline
-from slap_ros.baselines.training_tasks import VALIDATION
+from slap_ros.baselines.training_tasks import EACH, VALIDATION
 from slap_ros.baselines.trials import task_progress, try_baseline
 from slap_ros.environments.registration import make_task_env
 from slap_ros.environments.task_env import TaskEnv
@@ -151,8 +153,16 @@ class BaselineTraining:
     ) -> float:
         """The mean over validation tasks of what a function gives for each."""
         seed, preset = self.distribution.task_seed, baseline.preset
-        tasks = VALIDATION.batch(0, self.settings.validation)
+        tasks = self._validation_tasks
         return fmean(judge(baseline, preset, self.goal, seed, index) for index in tasks)
+
+    @cached_property
+    def _validation_tasks(self) -> list[int]:
+        """Indices of the first ones that the environment has room for, as training's are."""
+        fitting = self._make_env().fitting_tasks(
+            self.distribution.task_seed, iter(VALIDATION.batch(0, EACH))
+        )
+        return [index for index, _ in islice(fitting, self.settings.validation)]
 
 
 class _TrainingLog:

@@ -12,7 +12,12 @@ import numpy as np
 
 from slap_ros.environments.registration import make_task_env
 from slap_ros.environments.task_env import TaskEnv
-from slap_ros.errors import ErrorCode, InvalidCommandError, InvalidStateError
+from slap_ros.errors import (
+    ErrorCode,
+    InvalidCommandError,
+    InvalidLibraryError,
+    InvalidStateError,
+)
 from slap_ros.evaluation.experiment import Trial
 
 OUT_OF_STEPS = "the goal was not reached within the task's step limit"
@@ -67,10 +72,15 @@ def try_baseline(baseline: Rival, preset: str, goal: str | None, seed: int, inde
 
     Returns:
         The figures of the task; one that the baseline cannot observe counts as failed.
+
+    Raises:
+        InvalidLibraryError: It gives no action of the environment.
     """
     try:
         info = _act(baseline, preset, goal, seed, index)
-    except (InvalidStateError, InvalidCommandError) as error:
+    except InvalidCommandError as error:
+        raise InvalidLibraryError(f"{baseline.name}: {error}") from error
+    except InvalidStateError as error:
         return _trial(seed, index, False, 0, error.code, str(error))
     if info["success"]:
         return _trial(seed, index, True, info["steps"], ErrorCode.NONE, "")

@@ -12,7 +12,7 @@ import typer
 
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, styled
-from slap_ros.errors import ErrorCode
+from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Summary
 
@@ -76,7 +76,11 @@ def run_rivals(
         total = len(experiment) * len(baselines)
         watched = bar.add_task("baselines", total=total)
         for name, baseline in baselines.items():
-            trials = run_baseline(experiment, baseline, jobs, lambda _: bar.advance(watched))
+            try:
+                trials = run_baseline(experiment, baseline, jobs, lambda _: bar.advance(watched))
+            except SlapError as error:
+                found.complain(str(error) if name in str(error) else f"{name}: {error}")
+                continue
             found.results.append((Summary.of(experiment, name, trials, yardstick), trials))
             found.described.setdefault("against", {})[name] = describe_rival(baseline)
             for reason, count in _reasons(trials).items():

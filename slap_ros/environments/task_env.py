@@ -281,12 +281,34 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         Raises:
             InvalidStateError: None of a thousand can.
         """
-        for index in islice(indices, MOST_DRAWN):
-            task = task_with_goal(self.domain, seed, index, goal or self._goal)
-            reason = self._why_unfit(task)
-            if reason is None:
-                return task
-        raise InvalidStateError(f"{reason}; so have the {MOST_DRAWN} before it")
+        return next(self.fitting_tasks(seed, indices, goal))[1]
+
+    def fitting_tasks(
+        self, seed: int, indices: Iterator[int], goal: str | None = None
+    ) -> Iterator[tuple[int, Task]]:
+        """The tasks that can be observed and acted in, each with its index.
+
+        Args:
+            seed: Seed of the tasks.
+            indices: Indices of the tasks, of which as many are taken as are looked at.
+            goal: Goal of the tasks; None for that of the environment.
+
+        Returns:
+            The tasks, without end as far as there are indices.
+
+        Raises:
+            InvalidStateError: None of a thousand in a row can.
+        """
+        reason: str | None = None
+        while True:
+            for index in islice(indices, MOST_DRAWN):
+                task = task_with_goal(self.domain, seed, index, goal or self._goal)
+                reason = self._why_unfit(task)
+                if reason is None:
+                    yield index, task
+                    break
+            else:
+                raise InvalidStateError(f"{reason}; so have the {MOST_DRAWN} before it")
 
     def _require_fit(self, task: Task) -> None:
         if reason := self._why_unfit(task):

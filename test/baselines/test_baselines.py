@@ -4,6 +4,7 @@
 
 import json
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -189,6 +190,16 @@ def test_the_same_seed_learns_the_same_weights(tmp_path, domain, trained):
     assert not np.array_equal(first.policy.layers[0][0], other.policy.layers[0][0])
 
 
+def test_validation_has_the_tasks_that_there_is_room_for(tmp_path):
+    """Goals are numbered over the objects of one task, and others have more bystanders or fewer."""
+    changes = {"n_envs": 2, "learning_starts": 16, "batch_size": 8, "validation": 3}
+    varied = get_domain("obstacle2d", "fair")
+    counts = {len(varied.task(1_000_000, 2**31 + k).initial_state.objects) for k in range(3)}
+    assert len(counts) > 1
+    made = train_baseline("sac", varied, tmp_path / "sac", steps=32, changes=changes)
+    assert [steps for steps, _ in made.record["task_progress"]][0] == 0
+
+
 # -- trying ---------------------------------------------------------------------------------------
 
 
@@ -229,7 +240,33 @@ class Holding:
 
 make = Holding
 class Nothing: pass
+
+class Failing(Holding):
+    def predict(self, observation):
+        return 1 / 0
+class Leaving(Holding):
+    def predict(self, observation):
+        raise SystemExit(0)
+class Silent(Holding):
+    def predict(self, observation):
+        return None
+class Misfit(Holding):
+    environment = {}
+    def predict(self, observation):
+        return [[0.0, 0.0, 0.0]]
+class Elsewhere(Holding):
+    environment = {"foo": 1}
+class Unseen(Holding):
+    environment = {"obs": "foo"}
 """
+COMPLAINTS = {
+    "Failing": "predict failed: ZeroDivisionError('division by zero'), in my_policies.py, line 12",
+    "Leaving": "predict failed: SystemExit(0), in my_policies.py, line 15",
+    "Silent": "predict gave None, which is no action",
+    "Misfit": "an action is 3 finite numbers from -1 to 1, not array([[0., 0., 0.]])",
+    "Elsewhere": "its environment is {'foo': 1}; it may be a mapping of obs, control, reward",
+    "Unseen": "unknown obs 'foo'",
+}
 
 
 def test_anybodys_policy_is_named_by_its_function(tmp_path, monkeypatch):
@@ -243,6 +280,18 @@ def test_anybodys_policy_is_named_by_its_function(tmp_path, monkeypatch):
     assert (code, rows[1]["at_step_limit"]) == (ErrorCode.INVALID_LIBRARY, 1)
     assert "my_policies:Nothing: Nothing has no predict(observation)" in complaints
     assert "nowhere:make: cannot be made: ModuleNotFoundError" in complaints
+
+
+def test_a_policy_that_gives_no_action_is_refused_and_not_counted_as_failing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "my_policies", raising=False)
+    (tmp_path / "my_policies.py").write_text(CODE)
+    against = [part for name in COMPLAINTS for part in ("--against", f"my_policies:{name}")]
+    code, said, complaints = slap(*EVALUATE, "--tasks", 1, "--json", *against)
+    assert code == ErrorCode.INVALID_LIBRARY
+    assert [row["approach"] for row in json.loads(said)["approaches"]] == ["pure_planning"]
+    for name, complaint in COMPLAINTS.items():
+        assert f"my_policies:{name}: {complaint}" in complaints
 
 
 def test_a_baseline_of_another_domain_is_refused(trained):
