@@ -173,6 +173,10 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._faults.publish(encode.fault(error, self._episode, self._opened_ns, self._step))
         self.get_logger().error(f"{error.code.name}: {error}; nothing moves until reset_task")
 
+    def _report_unstarted(self, error: SlapError) -> None:
+        """Say why there is no first episode yet, to whoever waits for one."""
+        self._faults.publish(encode.fault(error, self._episode, self._opened_ns, self._step))
+
     def _publish_step(self, state: State) -> None:
         """Publish the state after a step; from now on a command that answers it is accepted."""
         self._step += 1

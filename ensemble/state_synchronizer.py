@@ -86,6 +86,7 @@ class StateSynchronizer:
         self._current, self._expected, self._others = Rooms(), Rooms(), Rooms()
         self._early_faults: OrderedDict[tuple[int, int], EpisodeFault] = OrderedDict()
         self._fault: EpisodeFault | None = None  # of the current episode
+        self._unstarted: EpisodeFault | None = None  # why there is no first episode
         self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals, common)
         self._early: EarlyMessages[Pair] = EarlyMessages(
             WAITING, lambda pair: pair.state, self._episodes.expects
@@ -150,6 +151,8 @@ class StateSynchronizer:
             raise failure
         if not seen() and self._episodes.refusal is not None:
             raise self._episodes.refusal
+        if self.episode is None and self._unstarted is not None:
+            raise decode_fault(self._unstarted)
         if self.latest is None or not seen():
             raise missing(
                 f"no perceived state{f' of episode {episode}' if episode else ''} within "
@@ -218,6 +221,9 @@ class StateSynchronizer:
     def _on_fault(self, message: EpisodeFault) -> None:
         if self.episode is not None and self.episode.is_ended_by(message):
             self._fault = message
+            return
+        if not message.episode:
+            self._unstarted = message
             return
         self._early_faults[message.episode, stamp_ns(message.header)] = message
         if len(self._early_faults) > WAITING:

@@ -67,6 +67,7 @@ Action clients:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from enum import Enum
 from typing import Any
@@ -98,6 +99,7 @@ from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.robot_world import GripperAction
 
 POLL_PERIOD = 0.02  # s, between two looks at what is measured
+REPORT_PERIOD_S = 1.0  # between two reports of why there is no task yet
 
 
 class Phase(Enum):
@@ -123,6 +125,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         told = self._settings.first_task(self._domain) if self._settings.goal else None
         self._goal: Collection[GroundAtom] = told.goal if told is not None else ()
         self._measurement: StepMeasurement  # of the step under way
+        self._reported_s = -math.inf  # when it was last said why there is no task yet
         period_s = self._domain.execution.control_period_s
         self._horizon = Horizon(self._settings.horizon, self._settings.motion_limits, period_s)
         self._expected = False  # whether the state in which the motion ends is published already
@@ -256,8 +259,14 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             state = self._robot.world.measure_first(self._since_s)
             if state is not None:
                 self._begin(state)
-        except (InvalidStateError, NoDetectionError) as error:
-            self.get_logger().warning(f"not yet: {error}", throttle_duration_sec=1.0)
+            elif self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout:
+                raise self._unmeasured
+        except (InvalidStateError, NoDetectionError, NoJointStateError) as error:
+            now_s = self._robot.clock.now_s()
+            if now_s - self._reported_s >= REPORT_PERIOD_S:
+                self._reported_s = now_s
+                self.get_logger().warning(f"not yet: {error}")
+                self._report_unstarted(error)
 
     def _reset(self, request: ResetTask.Request) -> None:
         if request.initial_state.objects:
@@ -269,13 +278,21 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         world = self._robot.world
         state = world.measure_first(self._since_s)
         if state is None:
-            self._robot.require_joints()
-            raise self._robot.no_detection(
-                self._since_s, f"within {self._settings.detection_timeout} s"
-            )
+            raise self._unmeasured
         space = self._domain.atom_space(world.scene_config.template)
         self._goal = decode_goal(request.goal, space)
         self._begin(state)
+
+    @property
+    def _unmeasured(self) -> SlapError:
+        """Why there is no state to begin in."""
+        try:
+            self._robot.require_joints()
+        except NoJointStateError as error:
+            return error
+        return self._robot.no_detection(
+            self._since_s, f"within {self._settings.detection_timeout} s"
+        )
 
     def _begin(self, state: State) -> None:
         world = self._robot.world

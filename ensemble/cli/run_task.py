@@ -200,9 +200,12 @@ def _require_camera(options: RunOptions, domain: Domain) -> None:
         return
     require_camera_libraries()
     if options.scene is None:
+        which = [f"--seed {options.task_seed}"]
+        which += [f"--index {options.index}"] if options.index else []
+        which += [f"--preset {options.preset}"] if options.preset else []
         raise InvalidParameterError(
-            f"a camera needs tags: slap scene {options.domain} --seed {options.task_seed} "
-            "--tags FOLDER, then --scene FOLDER/scene.yaml"
+            f"a camera needs tags: slap scene {options.domain} {' '.join(which)} --tags FOLDER, "
+            "then --scene FOLDER/scene.yaml"
         )
     from slap_ros.robot.scene_config import read_scene_config
     from slap_ros.robot.tagged_scene import placed_tags

@@ -15,7 +15,7 @@ from slap_ros.api.jobs import require_torch, some_workers
 from slap_ros.api.library_descriptions import describe_skills
 from slap_ros.api.setting_texts import Changes, change_texts
 from slap_ros.core import Domain
-from slap_ros.errors import InvalidParameterError
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.files import require_writable, sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
@@ -179,6 +179,8 @@ def _shortcuts_to_keep(folder: Path, domain: Domain) -> tuple[Shortcut, ...]:
     for refused in library.refused:
         raise refused
     require_same_skills(library, domain, str(folder))
+    if not library.shortcuts:
+        raise InvalidLibraryError(f"{folder}: there is no shortcut in it that could be kept")
     return library.shortcuts
 
 

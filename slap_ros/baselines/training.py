@@ -28,9 +28,10 @@ from slap_ros.baselines.training_tasks import EACH, VALIDATION
 from slap_ros.baselines.trials import task_progress, try_baseline
 from slap_ros.environments.registration import make_task_env
 from slap_ros.environments.task_env import TaskEnv
+from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.stored_keys import stored
 from slap_ros.learning.task_distribution import TaskDistribution
-from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.learning.work_folder import SETTINGS, WorkFolder
 from slap_ros.versions import processor, versions
 
 PROGRESS = "progress.jsonl"
@@ -67,7 +68,7 @@ class BaselineTraining:
         Raises:
             InvalidParameterError: The folder has another training, or is damaged.
         """
-        WorkFolder(self.folder).require_same(self._identity)
+        self._require_own_folder()
         tasks, count = self.distribution.task_seed, self.settings.n_envs
         envs = self.kind.make_envs(self._make_env, tasks, count)
         learner = self.kind.make_learner(self.settings, envs, self.distribution.seed)
@@ -79,6 +80,19 @@ class BaselineTraining:
         finally:  # after Ctrl-C too
             learner.save(self.folder)
         return self._chosen(learner, {"task_progress": curve.points} if curve else {})
+
+    def _require_own_folder(self) -> None:
+        """Refuse a folder whose checkpoint is another training's, or nobody knows whose.
+
+        Raises:
+            InvalidParameterError: It is.
+        """
+        if (self.folder / CHECKPOINT).exists() and not (self.folder / f"{SETTINGS}.json").exists():
+            raise InvalidParameterError(
+                f"{self.folder} has a checkpoint, and no {SETTINGS}.json that says of which "
+                "training: give another folder, or remove this one"
+            )
+        WorkFolder(self.folder).require_same(self._identity)
 
     def _curve(self, learner: TaskLearner) -> ProgressCurve | None:
         """What measures task progress now and then, where plans have stages to be rewarded for."""

@@ -63,6 +63,16 @@ def plan(
             raise InvalidParameterError(
                 "--within is not for PDDL files: --planner astar finds a plan of least cost"
             )
+        _refuse_given(
+            seed=seed is not None,
+            index=index != 0,
+            preset=preset is not None,
+            goal=goal is not None,
+            skills=skills != SHIPPED,
+            shortcuts=shortcuts is not None,
+            samples=samples != DEFAULT.samples,
+            output=output is not None,
+        )
         factor = 1 if effort is None else effort
         plan_pddl(Path(domain), problem or Path(domain), planner, factor, json)
         return
@@ -77,3 +87,15 @@ def plan(
     task = task_with_goal(chosen, seed_or_default(seed), index, goal)
     plan_task(chosen, task, planner, shortcuts, samples, output, json)
     say_default_seed(seed)
+
+
+def _refuse_given(**given: bool) -> None:
+    """Refuse options that mean nothing where a PDDL file says all: task, goal and operators.
+
+    Raises:
+        InvalidParameterError: Some are given.
+    """
+    if names := ", ".join(f"--{name}" for name, is_given in given.items() if is_given):
+        raise InvalidParameterError(
+            f"{names}: not for PDDL files, which have the task, its goal and the operators"
+        )

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, write_whole
 
+SETTINGS = "settings"  # name of the file that says whose results a folder has
 Result = TypeVar("Result")
 # Errors that decoding raises where JSON is not what was written.
 DECODING_ERRORS = (OSError, AttributeError, LookupError, TypeError, ValueError, OverflowError)
@@ -37,7 +38,11 @@ class WorkFolder:
     path: Path
 
     def cached(
-        self, name: str, compute: Callable[[], Any], decode: Callable[[Any], Result]
+        self,
+        name: str,
+        compute: Callable[[], Any],
+        decode: Callable[[Any], Result],
+        advice: str = "remove it to have it made again",
     ) -> Result:
         """A result from the folder, or computed and put there.
 
@@ -45,6 +50,7 @@ class WorkFolder:
             name: Name of the result's file, without its ending; a folder may precede it.
             compute: Function that computes the result, as JSON.
             decode: Function that converts the JSON into the result.
+            advice: Advice where the file is damaged.
 
         Returns:
             The result, decoded.
@@ -61,7 +67,7 @@ class WorkFolder:
         try:
             return decode(parse_json(read_text(path)))
         except DECODING_ERRORS as error:
-            raise damaged(path, error, "remove it to have it made again") from error
+            raise damaged(path, error, advice) from error
 
     def require_same(self, settings: Mapping[str, Any]) -> None:
         """Refuse a folder with another training; an empty one becomes this one's.
@@ -73,7 +79,8 @@ class WorkFolder:
             InvalidParameterError: The folder has another training, or is damaged.
         """
         own = json.loads(json.dumps(settings))
-        if self.cached("settings", lambda: own, lambda theirs: theirs) != own:
+        advice = "give another folder, or remove this one: nobody knows what is in it"
+        if self.cached(SETTINGS, lambda: own, lambda theirs: theirs, advice) != own:
             raise InvalidParameterError(
                 f"{self.path} has a training with other settings; give another folder, or remove "
                 "this one"

@@ -162,6 +162,9 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     (tmp_path / "x-training" / "checkpoint.pt").write_bytes(b"PK damaged")
     with pytest.raises(InvalidParameterError, match=r"checkpoint\.pt: damaged"):
         train_baseline(method, domain, tmp_path / "x", **given)
+    (tmp_path / "x-training" / "settings.json").unlink()
+    with pytest.raises(InvalidParameterError, match=r"no settings\.json that says of which"):
+        train_baseline(method, domain, tmp_path / "x", **given, seed=1)
 
 
 @pytest.mark.slow

@@ -79,6 +79,14 @@ def test_no_effort_is_refused(tmp_path: Path, effort: str) -> None:
     assert f"the effort of planning must be 1 at least, got {effort}" in result.stderr
 
 
+def test_options_about_a_task_are_refused_beside_files_that_have_it(tmp_path: Path) -> None:
+    given = ("--goal", "(q zzz)", "--seed", "3", "--output", str(tmp_path / "problem.pddl"))
+    result = invoke(tmp_path, PAIRS["survey"], "plan", *given)
+    assert result.exit_code == ErrorCode.INVALID_PARAMETER
+    said = " ".join(result.stderr.split())
+    assert "--seed, --goal, --output: not for PDDL files" in said
+
+
 def test_a_rover_sends_from_where_it_sampled(tmp_path: Path) -> None:
     found = planned(tmp_path, PAIRS["survey"])
     assert found == {"plan": ["sample(r, hill)", "send(r, hill, hill, camp)"]}

@@ -29,7 +29,7 @@ from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest, run
 from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag, read_bag, replay_bag
-from slap_ros.errors import ErrorCode, InvalidParameterError
+from slap_ros.errors import ErrorCode, InvalidParameterError, SlapError
 from slap_ros.messages.interfaces import STATE
 from slap_ros.skills.domain_choice import DomainChoice
 from support.clocks import BY_THE_CLOCK, SettableClock
@@ -296,6 +296,21 @@ def test_a_task_is_solved_without_what_no_picture_shows(network, tmp_path):
     assert states
     assert not any(obj.name == "block5" for message in states for obj in message.objects)
     assert evaluate_bag(bag).states == metrics.plan_length + 1
+
+
+@pytest.mark.parametrize(
+    ("hidden", "bridge", "why"),
+    [
+        ("block4", {"hidden_after": 5}, "about what no picture has shown yet: block4"),
+        ("block2", {"detection_timeout": 2.0}, "block2; others are seen"),
+    ],
+)
+def test_a_task_that_cannot_begin_fails_with_what_is_missing(network, hidden, bridge, why):
+    chosen = settings({"hidden": hidden}, PATIENT | bridge, goal="(Holding robot block4)")
+    impatient = replace(chosen, patience=0.5)
+    with pytest.raises(SlapError, match=why) as failed:
+        run(RunRequest(impatient, timeout_s=600, in_process=True), lambda *_: None)
+    assert failed.value.code == ErrorCode.NO_DETECTION
 
 
 @on_both_robots

@@ -295,6 +295,14 @@ def test_a_shortcut_leads_beyond_the_graph_whatever_another_does_within():
     assert together.plan.predicted_steps <= alone.plan.predicted_steps
 
 
+def test_a_library_without_shortcuts_is_none_to_keep(library, tmp_path):
+    (shortcut,) = (entry for entry in library.iterdir() if entry.is_dir())
+    shutil.rmtree(shortcut)
+    with pytest.raises(InvalidLibraryError, match="no shortcut in it that could be kept"):
+        slap_ros.train(DOMAIN, tmp_path / "trained", keep=library)
+    assert not (tmp_path / "trained-training").exists()
+
+
 def test_the_rest_of_a_plan_is_as_short_where_it_is_planned_again_on_the_way():
     """With the wiper in the hand, operators reach what the sweep leads to in twelve more edges."""
     domain = get_domain("cleanup_table")
