@@ -71,6 +71,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
         target = (folder / match["target"]).resolve()
         if target in pages:
             return f"[{match['text']}]({up}{pages[target]}{match['anchor'] or ''})"
+        if made := _made_for(target, match["text"].strip("`")):
+            return f"[{match['text']}]({up}{made})"
         if target.is_relative_to(config.docs_dir) or not target.exists():
             return match[0]
         path = target.relative_to(ROOT).as_posix()
@@ -78,6 +80,23 @@ def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
         return f"`{path}`" if named else f"{match['text']} (`{path}`)"
 
     return LINK.sub(shown, QUOTATION.sub(r'\1"', markdown))
+
+
+def _made_for(source: Path, text: str) -> str | None:
+    """Where the page that is made of a source says what a link's text names; None for others."""
+    if source.is_relative_to(SCHEMAS):
+        return "interfaces.md" + (f"#{source.stem.lower()}" if source.is_file() else "")
+    if source == ROOT / "slap_ros":
+        return api_pages()["slap_ros.core"]
+    if not source.is_relative_to(ROOT / "slap_ros") or source.suffix != ".py":
+        return None
+    module = ".".join(source.relative_to(ROOT).with_suffix("").parts)
+    page = api_pages().get(".".join(module.split(".")[:2]))
+    if text == module:
+        return page
+    return (
+        f"{page}#{module}.{text}" if page and text[:1].isupper() and text.isidentifier() else None
+    )
 
 
 def copied(source: str) -> str:
