@@ -94,9 +94,8 @@ def _made_for(source: Path, text: str) -> str | None:
     page = api_pages().get(".".join(module.split(".")[:2]))
     if text == module:
         return page
-    return (
-        f"{page}#{module}.{text}" if page and text[:1].isupper() and text.isidentifier() else None
-    )
+    is_class = text.isidentifier() and text[0].isupper()
+    return f"{page}#{module}.{text}" if page and is_class else None
 
 
 def copied(source: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.environments.mdp_env import MdpEnv
-from slap_ros.errors import InvalidParameterError
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.shortcuts.explore import ExplorationResult
@@ -99,6 +99,9 @@ def signatures(domain: Domain, shortcuts: str) -> dict[str, Signature]:
     else:
         library = chosen_library(shortcuts, domain)
         found = [] if library is None else [one.signature for one in library.shortcuts]
+        if library is not None and not found:
+            reasons = "; ".join(map(str, library.refused)) or "it has none"
+            raise InvalidLibraryError(f"{shortcuts}: no shortcut of it can be used: {reasons}")
     return {signature.name: signature for signature in found}
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import count, islice
+from numbers import Integral
 from typing import Any
 
 import gymnasium
@@ -52,6 +53,8 @@ REWARDS: Mapping[str, type[SparseReward | DenseReward | StagedReward]] = {
 }
 OBSERVATIONS = ("state", "view")
 CONTROLS = ("joints", "skills", "both", "primitives")
+# What reset may be told of the task, and of which type.
+OPTIONS: Mapping[str, type] = {"index": Integral, "goal": str, "state": State, "task": Task}
 PICTURE = PictureSize(480, 360)  # pixels
 
 
@@ -142,8 +145,12 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         """
         super().reset(seed=seed)
         chosen = dict(options or {})
-        for name in chosen:
-            _require("option", name, ("index", "goal", "state", "task"))
+        for name, value in chosen.items():
+            _require("option", name, list(OPTIONS))
+            if value is not None and not isinstance(value, OPTIONS[name]):
+                raise InvalidParameterError(
+                    f"option {name!r} is {value!r:.80}; it must be of type {OPTIONS[name].__name__}"
+                )
         task = self._task(seed, **chosen)
         self._episode = TaskEpisode.of(self.domain, task)
         self._enter(task.initial_state)

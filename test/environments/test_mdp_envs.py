@@ -14,6 +14,7 @@ from slap_ros.environments.registration import MADE_BY, SHORTCUTS, SKILLS
 from slap_ros.errors import (
     InvalidCommandError,
     InvalidDomainError,
+    InvalidLibraryError,
     InvalidParameterError,
     InvalidStateError,
 )
@@ -124,6 +125,12 @@ def test_candidates_of_a_work_folder_can_be_learned(tmp_path, pushing):
 def test_what_there_is_not_is_refused(name, given, error, words):
     with pytest.raises(error, match=words):
         gymnasium.make(f"slap_ros/{name}-v0", **given)
+
+
+def test_a_library_without_a_usable_shortcut_is_named(tmp_path):
+    (tmp_path / "library.json").write_text('{"format": 1, "domain": "obstacle2d"}')
+    with pytest.raises(InvalidLibraryError, match=f"{tmp_path}: no shortcut of it can be used"):
+        gymnasium.make("slap_ros/Obstacle2D-shortcut-v0", shortcuts=str(tmp_path))
 
 
 def test_bad_actions_options_and_tasks_are_refused(pushing):

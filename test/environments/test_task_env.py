@@ -184,6 +184,15 @@ def test_with_more_objects_than_there_is_room_for_a_task_is_refused_or_passed_ov
     assert env._first.layout is first
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "kind"), [("state", 5, "State"), ("goal", [1], "str"), ("index", "3", "")]
+)
+def test_options_of_another_type_are_refused(option, value, kind):
+    env = make_task_env("obstacle2d", "fair")
+    with pytest.raises(InvalidParameterError, match=f"option '{option}' is .* of type {kind}"):
+        env.reset(seed=1, options={option: value})
+
+
 def test_it_begins_in_a_state_that_is_given():
     env = make_task_env("obstacle2d")
     env.reset(seed=1)
