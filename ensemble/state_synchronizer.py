@@ -162,7 +162,7 @@ class StateSynchronizer:
         return self.latest
 
     def _open(self, episode: Episode, _: None) -> None:
-        self._current = Rooms()
+        self._current, self._unstarted = Rooms(), None
         self._fault = self._early_faults.get((episode.number, episode.opened_ns))
         assert self._episodes.opened is not None
         if early := self._early.take(episode):
