@@ -170,11 +170,11 @@ class LockstepWorld(Node, ABC, Generic[P]):
         """End the episode: no step is taken, and no state published, until the next reset."""
         self._fault = error.code
         self._counts["faults"] += 1
-        self._faults.publish(encode.fault(error, self._episode, self._opened_ns, self._step))
+        self._publish_fault(error)
         self.get_logger().error(f"{error.code.name}: {error}; nothing moves until reset_task")
 
-    def _report_unstarted(self, error: SlapError) -> None:
-        """Say why there is no first episode yet, to whoever waits for one."""
+    def _publish_fault(self, error: SlapError) -> None:
+        """Say what ended the episode, or, of episode 0, why there is none yet."""
         self._faults.publish(encode.fault(error, self._episode, self._opened_ns, self._step))
 
     def _publish_step(self, state: State) -> None:

@@ -266,7 +266,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             if now_s - self._reported_s >= REPORT_PERIOD_S:
                 self._reported_s = now_s
                 self.get_logger().warning(f"not yet: {error}")
-                self._report_unstarted(error)
+                self._publish_fault(error)
 
     def _reset(self, request: ResetTask.Request) -> None:
         if request.initial_state.objects:
