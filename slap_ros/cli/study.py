@@ -25,7 +25,7 @@ TABLES_IN = (
     "docs/reproducing.md",
     "docs/results/README.md",
     "docs/results/growth_stack_at_target.md",
-    "docs/skills.md",
+    "docs/skill-figures.md",
 )
 PAGES = [Path(page) for page in TABLES_IN]  # with tables made of results
 

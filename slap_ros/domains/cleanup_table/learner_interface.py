@@ -93,7 +93,7 @@ LEARNER_INTERFACE = LearnerInterface(
     joint_limit_penalty=observation.joint_limit_penalty,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )
-# Without one of the terms above; see docs/shortcuts.md#what-is-made-by-hand.
+# Without one of the terms above; see docs/by-hand.md.
 ABLATIONS: Mapping[str, LearnerInterface] = {
     "place from the bin": replace(
         LEARNER_INTERFACE, objects=_object_features(joined(PLACE, SPEED))

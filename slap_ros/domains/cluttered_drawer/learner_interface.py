@@ -93,7 +93,7 @@ LEARNER_INTERFACE = LearnerInterface(
     grasping=GRASPING,
     length_m=0.05,
 )
-# Without one of the terms above; see docs/shortcuts.md#what-is-made-by-hand.
+# Without one of the terms above; see docs/by-hand.md.
 ABLATIONS: Mapping[str, LearnerInterface] = {
     "place beside the target block": replace(
         LEARNER_INTERFACE, objects=_object_features(joined(PLACE, SPEED, TURN))

@@ -96,7 +96,7 @@ def _relative_features(state: State, hand: Array, column: Column) -> Array:
     return _object_features(state, hand, column)[..., 1:]
 
 
-# Without one of the terms above; see docs/shortcuts.md#what-is-made-by-hand.
+# Without one of the terms above; see docs/by-hand.md.
 ABLATIONS: Mapping[str, LearnerInterface] = {
     "reach of what is carried": replace(LEARNER_INTERFACE, hand=_gripper),
     "place on the table": replace(LEARNER_INTERFACE, objects=_relative_features),

@@ -163,7 +163,7 @@ LEARNER_INTERFACE = LearnerInterface(
     success_tolerance=_success_tolerance,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )
-# Without one of the terms above; see docs/shortcuts.md#what-is-made-by-hand.
+# Without one of the terms above; see docs/by-hand.md.
 ABLATIONS: Mapping[str, LearnerInterface] = {
     "joints towards things": replace(
         LEARNER_INTERFACE,

@@ -52,7 +52,7 @@ PURE = "pure planning"
 SHOWN = ("slap_1_sample", "slap")
 MEASURED = """\
 Each row leaves out the terms that it names, and nothing else. [What is made by
-hand](../shortcuts.md#what-is-made-by-hand) describes the terms. Without the *training settings* of
+hand](../by-hand.md) describes the terms. Without the *training settings* of
 this domain, those of every domain are used. For each of {trainings} seeds, the most promising
 shortcut is found once. Every row learns it from the same starts, with {steps} environment steps.
 Success is the share of the last {recent} episodes of training that reached the target, with the
