@@ -94,12 +94,24 @@ def main_table(results: Path) -> MarkdownTable:
 def front_table(results: Path) -> MarkdownTable:
     """One row per domain of ``slap study table1``, under the preset ``fair``.
 
+    Rivals were measured in all domains under the preset ``paper`` alone.
+
     Raises:
         InvalidParameterError: There is no data for a domain.
     """
     return MarkdownTable(
-        ("", "pure planning [steps]", "SLAP [steps]", "relative [95 %]", "the paper's [steps]"),
-        [[name, *_compared(key, results)] for key, name in DOMAINS.items()],
+        (
+            "",
+            "pure planning [steps]",
+            "SLAP [steps]",
+            "relative [95 %]",
+            "the paper's [steps]",
+            "best rival, under `paper`",
+        ),
+        [
+            [name, *_compared(key, results), _best_rival(key, results)]
+            for key, name in DOMAINS.items()
+        ],
     )
 
 
@@ -118,6 +130,20 @@ def _compared(domain: str, results: Path) -> list[str]:
         _with_interval(slap["relative_length"], slap["relative_interval"]),
         f"{mean['pure_planning']} → {mean['slap_1_sample']}",
     ]
+
+
+def _best_rival(domain: str, results: Path) -> str:
+    """The learner of whole tasks that solves most, then in the fewest steps."""
+    rows = [row for row in _rows_of("rivals", domain, results) if row["preset"] == "paper"]
+    rivals = [row for row in rows if row["approach"] != "pure_planning"]
+    if not rivals:
+        return NOT_MEASURED
+    solving = [row for row in rivals if row["success_rate"] > 0.0]
+    if not solving:
+        return "0% by all"
+    best = min(solving, key=lambda row: (-row["success_rate"], row["plan_length"]["mean"]))
+    solved, steps = best["success_rate"], best["plan_length"]["mean"]
+    return f"{label(best['approach'])}: {solved:.0%}, {steps:.1f} steps"
 
 
 def front_skill_table(results: Path) -> MarkdownTable:
@@ -147,13 +173,13 @@ def _under_paper(domain: str, results: Path) -> list[str]:
 
 def _under(preset: str, domain: str, results: Path) -> dict[str, dict[str, Any]]:
     """Rows of ``slap study table1`` under a preset, by approach."""
-    rows = _table1(domain, results)
+    rows = _rows_of("table1", domain, results)
     return {row["approach"]: row for row in rows if row["preset"] == preset}
 
 
-def _table1(domain: str, results: Path) -> list[dict[str, Any]]:
-    """All rows of ``slap study table1`` for a domain; none where there is no data."""
-    path = results / f"table1_{domain}.json"
+def _rows_of(study: str, domain: str, results: Path) -> list[dict[str, Any]]:
+    """All rows of a study for a domain; none where there is no data."""
+    path = results / f"{study}_{domain}.json"
     return list(parse_json(read_text(path))["found"]["rows"]) if path.exists() else []
 
 
@@ -253,7 +279,7 @@ def _trainings(domain: str) -> list[dict[str, Any]]:
 
 def _rows(domain: str, results: Path) -> Iterator[list[str]]:
     shown_domain, shown_preset = "", ""
-    for row in _table1(domain, results):
+    for row in _rows_of("table1", domain, results):
         name = DOMAINS[domain]
         preset = f"`{row['preset']}`"
         yield [

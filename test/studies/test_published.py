@@ -221,6 +221,24 @@ def test_a_page_is_left_as_it_is_where_a_table_cannot_be_made(tmp_path, page, sa
     assert path.read_text() == page
 
 
+def test_the_best_rival_solves_most_and_then_in_the_fewest_steps(tmp_path):
+    for path in PUBLISHED.glob("table1_*.json"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    name = "rivals_obstacle2d.json"
+    rows = json.loads((PUBLISHED / name).read_text(encoding="utf-8"))["found"]["rows"]
+    under_paper = {row["approach"]: row for row in rows if row["preset"] == "paper"}
+    page = "<!-- slap: slap study readme -->\n<!-- end -->\n"
+    said = []
+    for weaken in (lambda: None, lambda: under_paper["ppo"].update(success_rate=0.9)):
+        weaken()
+        (tmp_path / name).write_text(json.dumps({"found": {"rows": rows}}), encoding="utf-8")
+        (said_of_2d,) = [row for row in with_tables(page, tmp_path).splitlines() if "2D" in row]
+        said.append(said_of_2d.split("|")[-2].strip())
+    steps = {name: row["plan_length"] for name, row in under_paper.items()}
+    assert said[0] == f"PPO: 100%, {steps['ppo']['mean']:.1f} steps"
+    assert said[1] == f"hierarchical RL: 100%, {steps['hierarchical']['mean']:.1f} steps"
+
+
 def test_the_table_of_the_front_page_wants_data_of_its_preset(tmp_path):
     """A study of other presets, or of pure planning alone, is not enough, and is no crash."""
     name = "table1_obstacle2d.json"
