@@ -217,8 +217,7 @@ class Curriculum:
         """Forget the skills that have led into dead ends, and those that ended there."""
         for dead_end in dead_ends:
             self.callback.on_dead_end(iteration, dead_end)
-            for name in (dead_end.before, dead_end.skill):
-                state.skills[name] = state.skills[name].from_scratch()
+        state.start_over(name for end in dead_ends for name in (end.before, end.skill))
 
     def _choose_starts(
         self,
