@@ -39,11 +39,6 @@ class Trainer:
         self._process: subprocess.Popen[bytes] | None = None
         self._stopped = False
 
-    @property
-    def process_id(self) -> int | None:
-        """Of the process; None while there is none."""
-        return self._process.pid if self._process is not None else None
-
     def run(self, on_event: Callable[[Event], None]) -> None:
         """Train until it is done or stopped. Takes as long as it takes: call it in a thread.
 

@@ -181,7 +181,7 @@ class RecorderNode(Node):
     async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._looks, self._looks_left = 0, LONGEST
         await wait_until(self, self._is_quiet)
-        response.success = self._writer is not None
+        response.success = self._written > 0  # also where the bag was finished before
         response.message = str(self._path) if response.success else "nothing was recorded"
         self._close()
         return response

@@ -64,7 +64,7 @@ class Controllers:
         self._arm = ActionClient(node, FollowJointTrajectory, arm)
         self._gripper = ActionClient(node, GripperCommand, gripper)
         self._names = {self._arm: arm, self._gripper: gripper}
-        self._active: Any = None  # handle of the goal under way
+        self._sent: Future | None = None  # of the goal under way: its handle, once it is accepted
 
     def destroy(self) -> None:
         """Destroy the clients."""
@@ -130,29 +130,35 @@ class Controllers:
         )
 
     def hold(self) -> None:
-        """Have the goal under way canceled, if there is one: controllers then hold."""
-        if self._active is not None:
-            self._active.cancel_goal_async()
-            self._active = None
+        """Have the goal under way canceled, if there is one: controllers then hold.
+
+        One that is not accepted yet is canceled when it is.
+        """
+        if self._sent is None:
+            return
+        if self._sent.done():
+            _cancel(self._sent)
+        else:
+            self._sent.add_done_callback(_cancel)
+        self._sent = None
 
     async def _run(self, client: ActionClient, goal: object, limit_s: float) -> Any:
         name = self._names[client]
         if not client.server_is_ready():
             raise ControllerTimeoutError(f"{name} is not there: is the controller running?")
         end = monotonic() + limit_s
-        sent = client.send_goal_async(goal)
+        self._sent = sent = client.send_goal_async(goal)
         if not await wait_for_first(self._node, sent, lambda: monotonic() > end):
-            sent.add_done_callback(_cancel)  # should it be accepted after all
+            self.hold()
             raise ControllerTimeoutError(f"{name} did not answer within {limit_s:.2f} s")
         handle = sent.result()
         if not handle.accepted:
             raise ControllerRejectedError(f"{name} rejected a goal")
-        self._active = handle
         ended = handle.get_result_async()
         if not await wait_for_first(self._node, ended, lambda: monotonic() > end):
             self.hold()
             raise ControllerTimeoutError(f"{name} was not done within {limit_s:.2f} s")
-        self._active = None
+        self._sent = None
         return ended.result()
 
 

@@ -58,7 +58,8 @@ Subscribers:
 
 Services:
     slap/reset_task (slap_msgs/ResetTask): opens an episode in the state that is measured, whatever
-        the seed; a robot cannot be put into a given one. Ends a fault.
+        the seed; a robot cannot be put into a given one. Ends a fault. Refused until the
+        controllers have answered to the last motion.
 
 Action clients:
     trajectory_action (control_msgs/FollowJointTrajectory), gripper_action
@@ -73,6 +74,7 @@ from enum import Enum
 from typing import Any
 
 from builtin_interfaces.msg import Time
+from rclpy.task import Future
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
@@ -124,6 +126,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         )  # when the phase, or the measurement of a state, began
         told = self._settings.first_task(self._domain) if self._settings.goal else None
         self._goal: Collection[GroundAtom] = told.goal if told is not None else ()
+        self._motion: Future | None = None  # the newest: done when its controllers have answered
         self._measurement: StepMeasurement  # of the step under way
         self._reported_s = -math.inf  # when it was last said why there is no task yet
         period_s = self._domain.execution.control_period_s
@@ -204,7 +207,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         """
         self._expected = expected
         self._enter(Phase.MOVING)
-        self.executor.create_task(self._execute(*self._horizon.take()))
+        self._motion = self.executor.create_task(self._execute(*self._horizon.take()))
 
     async def _execute(self, gripper: GripperAction, points: tuple[TrajectoryPoint, ...]) -> None:
         try:
@@ -273,8 +276,12 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             raise InvalidStateError(
                 "a robot cannot be put into a state: arrange the objects, then reset without one"
             )
-        if self._phase is Phase.MOVING:
-            raise BusyError("the arm moves: cancel the task first")
+        if self._motion is not None and not self._motion.done():
+            # Also after a failure: what is left of the motion would go on in the new episode.
+            raise BusyError(
+                "a motion is under way: cancel the task first, or try again once the controllers "
+                "have answered"
+            )
         world = self._robot.world
         state = world.measure_first(self._since_s)
         if state is None:

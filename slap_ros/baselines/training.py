@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,6 +28,7 @@ from slap_ros.baselines.trials import task_progress, try_baseline
 from slap_ros.environments.registration import make_task_env
 from slap_ros.environments.task_env import TaskEnv
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.json_lines import append_line
 from slap_ros.learning.stored_keys import stored
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.work_folder import SETTINGS, WorkFolder
@@ -191,8 +191,7 @@ class _TrainingLog:
 
     def report(self, progress: BaselineProgress) -> None:
         """Write a line, and maybe a checkpoint."""
-        with (self._folder / PROGRESS).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(progress.as_json()) + "\n")
+        append_line(self._folder / PROGRESS, progress.as_json())
         if monotonic() - self._saved > CHECKPOINT_S:
             self._learner.save(self._folder)
             self._saved = monotonic()

@@ -9,14 +9,12 @@ for each. An interrupted command goes on after the jobs that have ended, to the 
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from slap_ros.files import parse_json, read_bytes
+from slap_ros.learning.json_lines import append_line, whole_lines
 from slap_ros.learning.work_folder import DECODING_ERRORS, WorkFolder, damaged
 
 Result = TypeVar("Result")
@@ -44,7 +42,7 @@ class FinishedJobs:
         if not self.path.exists():
             return {}
         try:
-            entries = [parse_json(line) for line in self._whole_lines()]
+            entries = whole_lines(self.path)
             return {int(one["job"]): one["result"] for one in entries if one["step"] == step}
         except DECODING_ERRORS as error:
             raise damaged(self.path, error, "remove it to have it made again") from error
@@ -58,20 +56,11 @@ class FinishedJobs:
             result: Result, in a form that JSON can hold.
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"step": step, "job": number, "result": result}) + "\n")
+        append_line(self.path, {"step": step, "job": number, "result": result})
 
     def remove(self) -> None:
         """Remove the file, once the whole result is written."""
         self.path.unlink(missing_ok=True)
-
-    def _whole_lines(self) -> list[bytes]:
-        """The lines of the file, of which one that was not written to its end is cut off."""
-        content = read_bytes(self.path)
-        whole = content[: content.rfind(b"\n") + 1]
-        if whole != content:
-            os.truncate(self.path, len(whole))
-        return whole.splitlines()
 
 
 def cached_jobs(

@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
-from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.errors import InvalidStateError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph
 from slap_ros.planning.corridor import CorridorBuilder
 from slap_ros.planning.effort import Effort
@@ -117,7 +117,10 @@ class AnytimePlanner:
         rest = Plan(planned.plan.edges[number + 1 :])
         if not (rest.edges and self.effort.improve) or self._is_good(planned):
             return None
-        ahead = self.problem.model.roll_out(edge.option, state, edge.target)
+        try:
+            ahead = self.problem.model.roll_out(edge.option, state, edge.target)
+        except InvalidStateError:  # as it is perceived, with noise, the model cannot be in it
+            return None
         if not ahead.reached:
             return None
         effort = replace(self.effort, rollouts=self.effort.improve * max(1, ahead.steps))

@@ -44,16 +44,18 @@ class DryRun:
     def of(cls, recorded: RecordedMotion, limits: Limits) -> DryRun:
         """Check every waypoint: positions, velocities, accelerations, workspace. Nothing moves."""
         period_s = recorded.domain.execution.control_period_s
-        motions, violations = [], []
+        planned: list[tuple[int, JointMotion]] = []
+        violations = []
         at = recorded.start
         for waypoint in recorded.waypoints:
             try:
-                motions.append(limits.motion(at, waypoint.joints, period_s))
+                motion = limits.motion(at, waypoint.joints, period_s)
+                planned.append((waypoint.step, motion))
             except UnsafeCommandError as error:
                 violations.append((waypoint.step, str(error)))
             at = waypoint.joints
-        extremes = tuple(_extremes(recorded, limits, motions))
-        return cls(tuple(motions), extremes, tuple(violations))
+        extremes = tuple(_extremes(recorded, limits, planned))
+        return cls(tuple(motion for _, motion in planned), extremes, tuple(violations))
 
     @property
     def duration_s(self) -> float:
@@ -75,8 +77,9 @@ class DryRun:
 
 
 def _extremes(
-    recorded: RecordedMotion, limits: Limits, motions: Sequence[JointMotion]
+    recorded: RecordedMotion, limits: Limits, planned: Sequence[tuple[int, JointMotion]]
 ) -> Iterator[Extreme]:
+    """What comes closest to each limit, of a recording and of its motions by step."""
     places = [(0, recorded.start), *((w.step, w.joints) for w in recorded.waypoints)]
     yield _worst(
         Extreme(f"joint {i + 1}", q[i], limits.low[i], limits.high[i], "rad", step)
@@ -94,7 +97,7 @@ def _extremes(
         ("velocity", "rad/s", _peak_velocity, limits.velocity),
         ("acceleration", "rad/s²", _peak_acceleration, limits.acceleration),
     ):
-        yield _worst(_peaks(name, unit, peak, allowed, recorded, motions))
+        yield _worst(_peaks(name, unit, peak, allowed, planned))
     points = [(step, grasp_pose(q).position) for step, q in places]
     box = limits.workspace
     for i, axis in enumerate("xyz"):
@@ -109,16 +112,13 @@ def _peaks(
     unit: str,
     peak: Callable[[float, float], float],
     allowed: Joints,
-    recorded: RecordedMotion,
-    motions: Sequence[JointMotion],
+    planned: Sequence[tuple[int, JointMotion]],
 ) -> Iterator[Extreme]:
-    steps = {waypoint.joints: waypoint.step for waypoint in recorded.waypoints}
     yield Extreme(f"{name} of joint 1", 0.0, -allowed[0], allowed[0], unit, 0)
-    for motion in motions:
+    for step, motion in planned:
         for i, (a, b) in enumerate(zip(motion.start, motion.target, strict=True)):
             value = peak(abs(b - a), motion.duration_s)
-            where = steps[motion.target]
-            yield Extreme(f"{name} of joint {i + 1}", value, -allowed[i], allowed[i], unit, where)
+            yield Extreme(f"{name} of joint {i + 1}", value, -allowed[i], allowed[i], unit, step)
 
 
 def _peak_velocity(way: float, duration_s: float) -> float:

@@ -12,7 +12,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Protocol
 
-from slap_ros.files import parse_json, read_text
+from slap_ros.learning.json_lines import whole_lines
 from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.policies.library_files import replace_folder
@@ -60,7 +60,7 @@ def latest(folder: ShortcutWorkFolder) -> dict[int, Progress]:
     if not folder.progress.exists():
         return {}
     try:
-        lines = [parse_json(line) for line in read_text(folder.progress).split("\n")[:-1]]
+        lines = whole_lines(folder.progress)
         return {int(line["stage"]): _restored(line) for line in lines}
     except DECODING_ERRORS as error:
         advice = "remove the folder to learn the shortcut again"

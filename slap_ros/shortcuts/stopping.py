@@ -8,14 +8,13 @@ planning, and only the shortest success counts. So plans are made for validation
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any
 
-from slap_ros.files import parse_json, read_text
+from slap_ros.learning.json_lines import append_line, whole_lines
 from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 
 
@@ -84,8 +83,7 @@ class PlanLengths:
 
     def _keep(self, validation: Validation) -> None:
         self.validations.append(validation)
-        with self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(_line(validation)) + "\n")
+        append_line(self._path, _line(validation))
 
 
 def is_flat(lengths: Sequence[float], rule: Stopping) -> bool:
@@ -113,14 +111,13 @@ def read_validations(path: Path) -> list[Validation]:
     if not path.exists():
         return []
     try:
-        lines = [parse_json(line) for line in read_text(path).split("\n")[:-1]]
         return [
             Validation(
                 int(line["stage"]),
                 int(line["steps"]),
                 inf if line["plan_length"] is None else float(line["plan_length"]),
             )
-            for line in lines
+            for line in whole_lines(path)
         ]
     except DECODING_ERRORS as error:
         advice = "remove the folder to learn the shortcut again"

@@ -19,11 +19,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from slap_ros.learning.json_lines import append_line
 
 
 def attempt_folder(folder: Path, name: str, attempt: int) -> Path:
@@ -82,5 +83,4 @@ class ShortcutWorkFolder:
     def append(self, progress: Mapping[str, Any]) -> None:
         """Add a line to the progress; NaN, where there is no number yet, as null."""
         plain = {k: None if v != v else v for k, v in progress.items()}
-        with self.progress.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(plain) + "\n")
+        append_line(self.progress, plain)

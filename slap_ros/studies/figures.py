@@ -41,6 +41,7 @@ STYLE: dict[Any, Any] = {
     "figure.constrained_layout.wspace": 0.05,
 }
 # Okabe and Ito's, without yellow and black: apart from one another for the colour-blind as well.
+APART = 0.1  # between markers of neighbouring series, in the unit of their places
 LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 
 
@@ -181,16 +182,15 @@ def legend_above(figure: Figure, axes: Axes) -> None:
     )
 
 
-def dodged(places: Sequence[float], number: int, count: int, apart: float = 0.1) -> list[float]:
+def dodged(places: Sequence[float], number: int, count: int) -> list[float]:
     """Move the places of one of several series, so that markers do not cover each other.
 
     Args:
         places: Horizontal coordinates that the series share.
         number: Number of the series, from 0.
         count: Number of series.
-        apart: Distance between neighbouring series, in the unit of ``places``.
 
     Returns:
         The places of that series.
     """
-    return [place + (number - (count - 1) / 2) * apart for place in places]
+    return [place + (number - (count - 1) / 2) * APART for place in places]

@@ -192,6 +192,14 @@ def test_a_skill_that_never_succeeds_is_learned_from_scratch_and_so_is_what_come
     assert not others.computed
 
 
+def test_a_replay_buffer_without_room_for_a_segment_is_refused(tmp_path):
+    steps = WHOLE.segment_steps(HORIZON)
+    small = replace(WHOLE, sac=replace(WHOLE.sac, buffer_size=steps - 1))
+    with pytest.raises(InvalidParameterError, match=f"a segment has {steps} environment steps"):
+        acquire(tmp_path, small)
+    assert not any(tmp_path.iterdir())
+
+
 def test_dead_ends_are_behind_skills_that_were_learned_and_not_too_often():
     def rolled_out(*operators):
         ends = ["done"] * (len(operators) - 1) + ["effect not reached"]

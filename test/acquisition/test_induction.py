@@ -23,7 +23,16 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, ProposalRejectedError
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
-from slap_ros.relational import GroundAtom, GroundOperator, LiftedOperator
+from slap_ros.relational import (
+    Column,
+    GroundAtom,
+    GroundOperator,
+    LiftedOperator,
+    Predicate,
+    State,
+    Type,
+)
+from slap_ros.relational.predicates import Bools
 from support.paper_problems import ALL, Printed, peg_in_hole, stow_hammer
 
 PEGS = peg_in_hole()
@@ -138,6 +147,22 @@ def test_what_is_only_lost_for_a_while_is_a_passage_however_long() -> None:
 @pytest.mark.parametrize(("period_s", "steps"), [(0.05, 6), (0.1, 3), (0.125, 3), (1.0, 3)])
 def test_atoms_have_to_last_in_time_and_in_steps(period_s: float, steps: int) -> None:
     assert hold_steps_of(period_s) == steps
+
+
+def test_operators_have_different_names_also_where_predicates_end_in_numbers() -> None:
+    def never(state: State, *columns: Column) -> Bools:
+        raise AssertionError("no state is looked at")
+
+    thing = Type("thing")
+    on, on2 = (Predicate(name, (thing,), never)(thing("a")) for name in ("On", "On2"))
+    trace = [held for held in (set(), {on2}, {on}, {on2}, {on, on2}) for _ in range(4)]
+    induced = induce_operators([[frozenset(held) for held in trace]])
+    assert [one.operator.name for one in induced] == [
+        "AchieveOn2",  # where nothing held
+        "AchieveOn",
+        "AchieveOn22",  # in the place of On
+        "AchieveOn3",  # beside On2
+    ]
 
 
 def test_flicker_is_no_change() -> None:

@@ -13,7 +13,7 @@ from stable_baselines3.common.torch_layers import create_mlp
 
 from slap_ros.acquisition.training.episodes import load_episodes, save_episodes
 from slap_ros.acquisition.training.sac import SkillLearner
-from slap_ros.acquisition.training.sac_settings import SAC_PRESETS, SMALL, sac_preset
+from slap_ros.acquisition.training.sac_settings import SAC_PRESETS, SMALL
 from slap_ros.acquisition.training.sac_update import LeanSac
 from slap_ros.acquisition.training.skill_env import SkillMdp, SkillVecEnv
 from slap_ros.acquisition.training.twin_critics import NormalisedRectifier, Rectifier, TwinCritics
@@ -273,8 +273,6 @@ def test_pick_is_learned():
     assert success(one.policy()) >= 0.9
 
 
-def test_unknown_settings_are_refused():
-    with pytest.raises(InvalidParameterError, match="there are small, large, maple"):
-        sac_preset("huge")
+def test_environments_that_no_whole_number_of_updates_follows_are_refused():
     with pytest.raises(InvalidParameterError, match="give a multiple"):
         replace(SMALL, n_envs=7)

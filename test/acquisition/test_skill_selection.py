@@ -72,3 +72,21 @@ def test_patience_is_a_setting():
     patient = replace(SETTINGS, patience=3)
     chosen = select_skills(rolled_out(HERE), curriculum(THE_SAME), patient).operators
     assert chosen == ("Open", "Put")
+
+
+def test_what_two_skills_fail_after_is_learned_again_once():
+    """Whatever Put and Open have learned: neither has ever succeeded behind Pick."""
+    plans = [
+        PlanRollout(i, ("Pick", name), (stage("Pick", 0.0), stage(name, HERE, StageEnd.NO_EFFECT)))
+        for i, name in enumerate(["Put", "Open"] * PLANS)
+    ]
+    vain = {
+        name: SkillProgress(2, 0.0, 2, InitiationStates.of(name, plans).digest)
+        for name in ("Put", "Open")
+    }
+    state = CurriculumState({"Pick": SkillProgress(1, 1.0), **vain}, list(THE_SAME))
+    selection = select_skills(plans, state, SETTINGS)
+    assert [end.before for end in selection.dead_ends] == ["Pick", "Pick"]
+    assert selection.operators == ("Pick",)
+    state.start_over(name for end in selection.dead_ends for name in (end.before, end.skill))
+    assert [skill.attempt for skill in state.skills.values()] == [1, 1, 1]

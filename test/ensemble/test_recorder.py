@@ -75,6 +75,9 @@ def test_a_bag_is_closed_beside_somebody_who_never_stops(network, tmp_path):
         answer = close.call_async(CLOSE_BAG.type.Request())
         assert spinner.spin_until(answer.done, LIMIT)
         assert answer.result().success
+        again = close.call_async(CLOSE_BAG.type.Request())
+        assert spinner.spin_until(again.done, LIMIT)
+        assert (again.result().success, again.result().message) == (True, str(tmp_path / "bag"))
     assert [topic for topic, *_ in read_bag(tmp_path / "bag") if topic == "/slap/task"]
 
 

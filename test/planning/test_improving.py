@@ -10,11 +10,13 @@ import pytest
 from slap_ros.api.execution import Run
 from slap_ros.bags import evaluate_bag
 from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidStateError
 from slap_ros.planning.anytime import AnytimePlanner
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import ImprovingPlanner, make_planner
 from slap_ros.planning.problem import Problem
+from slap_ros.relational import Target
 from slap_ros.report import read_report
 
 DOMAIN = get_domain("obstacle_tower", "fair:obstacles=4")
@@ -81,6 +83,16 @@ def test_a_plan_that_is_proven_or_good_enough_is_left_alone():
     content = make_planner("anytime:within=100", DOMAIN, state)
     assert content.improve_rest(planner(0).plan(state, GOAL), 0, state, GOAL) is None
     assert content.problem.model.executed == 0
+
+
+def test_where_the_model_refuses_what_is_perceived_the_plan_is_left_alone():
+    state, by = TASK.initial_state, planner(improve=4)
+    one, other = (obj for obj in state.objects if obj.name in ("block1", "block2"))
+    inside = state.replace({(other, axis): float(state.get(one, axis)) for axis in "xyz"})
+    planned = by.plan(state, GOAL)
+    with pytest.raises(InvalidStateError, match="are inside one another"):
+        by.problem.model.roll_out(planned.plan.edges[0].option, inside, Target.exactly(0))
+    assert by.improve_rest(planned, 0, inside, GOAL) is None
 
 
 def test_the_other_planners_have_nothing_to_improve():

@@ -458,6 +458,37 @@ def test_a_reset_opens_an_episode_as_measured_and_ends_a_fault(network, world):
         assert bench.states[-1].step == 0
 
 
+def test_a_reset_waits_for_the_controllers_of_a_motion_that_failed(network):
+    """Joint positions fail while the fingers move, and are back before these are done."""
+    with lab(EXACT, {"joint_timeout": 0.3}) as bench:
+        bench.until(lambda: bench.joints)
+        before = bench.joints[-1][0]
+        robot, bridge = (
+            next(n for n in bench.spinner.executor.get_nodes() if n.get_name() == name)
+            for name in ("mock_robot", "robot_bridge")
+        )
+        robot._controllers._period_s = 1.5  # s, that the fingers take
+        bridge._robot.world._lost = True  # what was held: they are to be opened
+        encoders = robot._joints._joints
+        publish, encoders.publish = encoders.publish, lambda _: None
+        bench.command(deltas=[0.05, *STILL[1:]])
+        bench.until(lambda: bench.faults)
+        encoders.publish = publish
+        answers = []
+
+        def begun():
+            answers.append(bench.reset())
+            return answers[-1].error_code == 0
+
+        bench.until(begun)
+        bench.until(lambda: bench.states[-1].episode == 2)
+        for _ in range(3):
+            bench.step()
+        assert bench.joints[-1][0] == pytest.approx(before, abs=1e-6)  # the command is forgotten
+        assert len(bench.faults) == 1
+        assert ErrorCode.BUSY in [answer.error_code for answer in answers]
+
+
 def test_a_skill_server_that_dies_leaves_the_robot_holding(network):
     nodes = node_parameters(settings(bridge=PATIENT))
     mind = {name: nodes.pop(name) for name in ("skill_server", "planner_node")}

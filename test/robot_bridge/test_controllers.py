@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 from control_msgs.action import FollowJointTrajectory, GripperCommand
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -34,6 +34,7 @@ class Driver:
 
     def __init__(self, node, settings):
         self.node, self.end, self.result, self.gap = node, "succeed", {}, GAP_OPEN
+        self.accept = lambda _: GoalResponse.ACCEPT
         self._states = node.create_publisher(JointState, JOINT_STATES.name, JOINT_STATES.qos)
         self._names = [*arm_joints(settings.arm), *finger_joints(settings.arm)]
         self._servers = [
@@ -42,6 +43,7 @@ class Driver:
                 kind,
                 action_name(name, settings.arm),
                 answer,
+                goal_callback=lambda goal: self.accept(goal),
                 cancel_callback=lambda _: CancelResponse.ACCEPT,
             )
             for kind, name, answer in (
@@ -131,6 +133,28 @@ def test_a_canceled_grip_is_none_whatever_the_fingers_hold(network):
         found = outcome(spinner, robot.move_fingers(GAP_SHUT))
         assert isinstance(found, ControllerAbortedError)
         assert "franka_gripper/gripper_action canceled a goal" in str(found)
+
+
+def test_a_motion_that_is_to_be_held_before_it_is_accepted_is_canceled(network):
+    with driven() as (robot, driver, spinner):
+
+        def accept(_):
+            robot.controllers.hold()  # as a fault does meanwhile
+            return GoalResponse.ACCEPT
+
+        async def canceled(goal, result):
+            for _ in range(100):
+                if goal.is_cancel_requested:
+                    goal.canceled()
+                    return result
+                await pause(driver.node, 0.01)
+            goal.succeed()
+            return result
+
+        driver.accept, driver._ended = accept, canceled
+        found = outcome(spinner, robot.controllers.follow([TrajectoryPoint(0.1, (0.01,) * 7)]))
+        assert isinstance(found, ControllerAbortedError)
+        assert "follow_joint_trajectory canceled a motion" in str(found)
 
 
 @pytest.mark.parametrize(

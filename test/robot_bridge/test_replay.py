@@ -102,6 +102,15 @@ def test_every_motion_of_a_dry_run_keeps_the_limits(bag):
     assert found.duration_s > len(recorded.waypoints) * recorded.domain.execution.control_period_s
 
 
+def test_the_fastest_step_is_the_one_in_which_the_arm_moves_not_one_in_which_it_stands_there(bag):
+    recorded = read_recorded_motion(bag)
+    first = next(w for w in recorded.waypoints if w.joints != recorded.start)
+    stands = [replace(first, step=step) for step in (1, 2, 3)]
+    found = DryRun.of(replace(recorded, waypoints=tuple(stands)), HALF)
+    steps = {e.quantity.split()[0]: e.step for e in found.extremes}
+    assert (steps["velocity"], steps["acceleration"]) == (1, 1)
+
+
 @pytest.mark.parametrize(
     ("limits", "words"),
     [

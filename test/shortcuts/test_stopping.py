@@ -57,6 +57,8 @@ def test_half_a_line_is_left_out_and_damage_is_named(tmp_path):
     path = tmp_path / "plan_lengths.jsonl"
     path.write_text('{"stage": 0, "steps": 100, "plan_length": 9.0}\n{"stage": 0, "st')
     assert read_validations(path) == [Validation(0, 100, 9.0)]
+    PlanLengths(path, RULE, lambda: 8.0).go_on(0, 200)
+    assert read_validations(path) == [Validation(0, 100, 9.0), Validation(0, 200, 8.0)]
     path.write_text('{"stage": 0, "steps": 100}\n')
     with pytest.raises(InvalidParameterError, match=r"plan_lengths\.jsonl.*damaged"):
         read_validations(path)

@@ -83,6 +83,9 @@ class Curriculum:
         shortcuts: Shortcuts after which skills are tried as well; None for no shortcuts.
         continued: Folders of the trainings of kept skills, by operator name. Where these skills are
             learned further, their trainings go on.
+
+    Raises:
+        InvalidParameterError: The replay buffer has no room for a segment.
     """
 
     source: TaskSource
@@ -99,6 +102,7 @@ class Curriculum:
     def __post_init__(self) -> None:
         self._results = CurriculumFolder(self.folder)
         self._domain = self.source.make_domain()
+        self.settings.require_room(horizon_of(self._domain))
         self._segment_steps = self.settings.segment_steps(horizon_of(self._domain))
         self._operators = {operator.name: operator for operator in self.source.operators()}
         self._kept_folders = {skill.operator.name: path for path, skill in self.kept.items()}
@@ -217,8 +221,7 @@ class Curriculum:
         """Forget the skills that have led into dead ends, and those that ended there."""
         for dead_end in dead_ends:
             self.callback.on_dead_end(iteration, dead_end)
-            for name in (dead_end.before, dead_end.skill):
-                state.skills[name] = state.skills[name].from_scratch()
+        state.start_over(name for end in dead_ends for name in (end.before, end.skill))
 
     def _choose_starts(
         self,

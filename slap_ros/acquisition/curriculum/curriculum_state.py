@@ -100,6 +100,15 @@ class CurriculumState:
         """Environment steps that all skills together have learned for."""
         return sum(skill.steps for skill in self.skills.values())
 
+    def start_over(self, names: Iterable[str]) -> None:
+        """Have skills learned from scratch, each of them once more.
+
+        Args:
+            names: Names of the operators, in any number.
+        """
+        for name in set(names):
+            self.skills[name] = self.skills[name].from_scratch()
+
     @property
     def improved(self) -> bool:
         """Whether plans got further in this iteration than in the one before."""

@@ -64,7 +64,7 @@ def select_skills(
     not_trained = {name: reason for name, reason in reasons.items() if reason is not None}
     hopeless = [name for name in not_trained if not_trained[name]["why"] == NO_PROGRESS]
     dead_ends = find_dead_ends(hopeless, rollouts, state)
-    again = [end.before for end in dead_ends]
+    again = list(dict.fromkeys(end.before for end in dead_ends))  # several may fail after one
     hopeful = again + [name for name in often if name not in {*not_trained, *again}]
     if not hopeful:
         return SkillSelection((), 0, not_trained)

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise, permutations
+from itertools import chain, count, pairwise, permutations
 
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.acquisition.proposals.proposal import Proposal, ProposalProvenance
@@ -252,8 +252,8 @@ def _names(clusters: Sequence[_Cluster]) -> list[str]:
         # What is about most objects says most: In(peg, hole) rather than HandEmpty.
         predicate, _ = min(changed, key=lambda atom: (-len(atom[1]), str(atom[0])))
         name = f"{verb}{predicate}"
-        count = sum(other.rstrip("0123456789") == name for other in names)
-        names.append(f"{name}{count + 1}" if count else name)
+        numbered = (f"{name}{number}" for number in count(2))
+        names.append(next(free for free in chain((name,), numbered) if free not in names))
     return names
 
 

@@ -117,17 +117,14 @@ class LanguageRewarder:
 
     name = "language"
 
-    def __init__(self, inquiry: Inquiry, with_definitions: bool = True) -> None:
+    def __init__(self, inquiry: Inquiry) -> None:
         """Ask a model in a conversation.
 
         Args:
             inquiry: Conversation with a model; it has a budget of its own, or that of the
                 operators.
-            with_definitions: Whether the question quotes the metrics' source, or has their
-                signatures alone.
         """
         self._inquiry = inquiry
-        self._with_definitions = with_definitions
 
     def rewards(
         self, operators: Sequence[LiftedOperator], problem: AcquisitionProblem
@@ -143,7 +140,5 @@ class LanguageRewarder:
             raise InvalidDomainError(
                 f"domain {problem.name} has no metrics, so there is nothing to make rewards of"
             )
-        questions = (
-            (op.name, about_reward(op, problem, self._with_definitions)) for op in operators
-        )
+        questions = ((op.name, about_reward(op, problem)) for op in operators)
         return {name: self._inquiry.ask(question).value for name, question in questions}

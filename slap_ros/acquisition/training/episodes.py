@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from slap_ros.files import parse_json, read_bytes
+from slap_ros.files import parse_json, read_bytes, write_whole
 from slap_ros.learning.work_folder import damaged
 from slap_ros.relational import Layout, Object, Type
 from slap_ros.relational.state import Array
@@ -65,9 +65,7 @@ def save_episodes(path: Path, episodes: Episodes) -> None:
         }
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_suffix(".draft")
-    draft.write_bytes(content)
-    draft.replace(path)
+    write_whole(path, content)
 
 
 def load_episodes(path: Path, types: Mapping[str, Type]) -> Episodes:

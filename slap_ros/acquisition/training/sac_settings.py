@@ -91,16 +91,3 @@ SAC_PRESETS: Mapping[str, SacSettings] = {
         buffer_size=1_000_000,
     ),
 }
-
-
-def sac_preset(name: str) -> SacSettings:
-    """Settings by name.
-
-    Raises:
-        InvalidParameterError: There are none of that name.
-    """
-    try:
-        return SAC_PRESETS[name]
-    except KeyError:
-        known = ", ".join(SAC_PRESETS)
-        raise InvalidParameterError(f"unknown SAC settings {name!r}; there are {known}") from None

@@ -75,6 +75,22 @@ class AcquisitionSettings:
         """The number of environment steps of a segment."""
         return self.segment_episodes * self.sac.n_envs * horizon
 
+    def require_room(self, horizon: int) -> None:
+        """Refuse a replay buffer without room for a segment, whose episodes are added at once.
+
+        Args:
+            horizon: Environment steps of an episode.
+
+        Raises:
+            InvalidParameterError: It has none.
+        """
+        steps = self.segment_steps(horizon)
+        if self.sac.buffer_size < steps:
+            raise InvalidParameterError(
+                f"sac.buffer_size is {self.sac.buffer_size}, and a segment has {steps} environment "
+                "steps; give as many at least, or fewer segment_episodes"
+            )
+
 
 ACQUISITION_SETTINGS: Mapping[str, AcquisitionSettings] = {
     name: replace(AcquisitionSettings(), sac=sac) for name, sac in SAC_PRESETS.items()

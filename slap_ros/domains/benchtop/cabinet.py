@@ -105,6 +105,6 @@ class CabinetShape:
         )
 
 
-def cabinet_features(pose: Pose, opening: float = 0.0) -> Mapping[str, float]:
-    """A cabinet's features, for ``State.build``: its frame's pose, and how far it is open, m."""
-    return jointed_features(pose, opening, FLOOR)
+def cabinet_features(pose: Pose) -> Mapping[str, float]:
+    """The features of a cabinet that is closed, for ``State.build``, by its frame's pose."""
+    return jointed_features(pose, 0.0, FLOOR)

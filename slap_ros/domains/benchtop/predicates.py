@@ -65,15 +65,14 @@ def on(thing: Type, place: Type, name: str = "On", radius: float = STACKED) -> P
     return Predicate.of(name, (thing, place), conditions)
 
 
-def is_open(drawer: Type, opening: Metric, name: str = "IsCabinetOpen") -> Predicate:
+def is_open(drawer: Type, opening: Metric) -> Predicate:
     """The predicate that a drawer is open far enough for things to go in and out.
 
     Args:
         drawer: Type of the drawers.
         opening: Metric of how far a drawer is open.
-        name: Name of the predicate.
     """
-    return Predicate.of(name, (drawer,), [at_least(opening, DRAWER_OPEN)])
+    return Predicate.of("IsCabinetOpen", (drawer,), [at_least(opening, DRAWER_OPEN)])
 
 
 def is_closed(

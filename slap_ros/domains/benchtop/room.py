@@ -42,28 +42,26 @@ class Station:
         )
 
 
-def palm_space(pose: Pose, bottom: float = PALM_BOTTOM, room: float = ROOM) -> OrientedBox:
+def palm_space(pose: Pose, bottom: float = PALM_BOTTOM) -> OrientedBox:
     """The space around the palm of a hand that is open.
 
     Args:
         pose: Pose of the grasp point, upright: z upwards, fingers along y.
         bottom: Height over the grasp point at which the space begins.
-        room: Free space around the palm along x and y, m.
     """
     x, y, z = PALM.half_extents_m
     top = PALM_BOTTOM + 2.0 * z
-    half = (x + room, y + room, 0.5 * (top - bottom))
+    half = (x + ROOM, y + ROOM, 0.5 * (top - bottom))
     return OrientedBox(pose.compose(Pose((0.0, 0.0, 0.5 * (top + bottom)))), half)
 
 
-def finger_space(pose: Pose, room: float = ROOM) -> OrientedBox:
+def finger_space(pose: Pose) -> OrientedBox:
     """The space around open fingers, and between them.
 
     Args:
         pose: Pose of the grasp point, upright: z upwards, fingers along y.
-        room: Free space around the fingers along x and y, m.
     """
-    half = (STEM.half_extents_m[0] + room, STEM_REACH + room, 0.5 * (STEM_TOP + BELOW))
+    half = (STEM.half_extents_m[0] + ROOM, STEM_REACH + ROOM, 0.5 * (STEM_TOP + BELOW))
     return OrientedBox(pose.compose(Pose((0.0, 0.0, 0.5 * (STEM_TOP - BELOW)))), half)
 
 

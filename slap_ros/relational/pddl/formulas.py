@@ -50,23 +50,6 @@ def read_conjunction(node: Node) -> list[Formula]:
     return [read_formula(listed) for listed in _conjuncts(node)]
 
 
-def read_effect(node: Node) -> tuple[list[Formula], list[Formula]]:
-    """The atoms that a conjunction of atoms and negated atoms adds, and those it deletes.
-
-    Raises:
-        MalformedPddlError: Anything else.
-    """
-    added, deleted = [], []
-    for listed in _conjuncts(node):
-        if listed.head != "not":
-            added.append(read_formula(listed))
-        elif len(listed.items) == 2:
-            deleted.append(read_formula(listed.items[1]))
-        else:
-            raise MalformedPddlError(f"{listed.position}: 'not' takes one atom")
-    return added, deleted
-
-
 def _conjuncts(node: Node) -> Iterator[ListNode]:
     listed = expect_list(node, "an atom or a conjunction")
     if listed.head == "and":

@@ -174,16 +174,6 @@ class PlanTrials:
         }
 
 
-def expected_attempts(operators: float, planning: float) -> float:
-    """How many attempts a plan takes where operators and plan succeed with these probabilities."""
-    return 1.0 / (operators * planning)
-
-
-def one_shot_success(operators: float, planning: float) -> float:
-    """How often the first attempt gives a plan."""
-    return operators * planning
-
-
 def study(
     models: Mapping[str, LanguageModel],
     problems: Sequence[AcquisitionProblem],

@@ -70,6 +70,6 @@ def robot_features(hand: HandState) -> Mapping[str, float]:
     return dict(zip((f.name for f in ROBOT.features), values, strict=True))
 
 
-def opening_features(opening: float = 0.0, velocity: float = 0.0) -> Mapping[str, float]:
-    """A jointed body's features, for ``State.build``: m and m/s, or rad and rad/s."""
-    return {"opening": opening, "opening_velocity": velocity}
+def opening_features(opening: float) -> Mapping[str, float]:
+    """The features of a jointed body that stands, for ``State.build``: its opening, m or rad."""
+    return {"opening": opening, "opening_velocity": 0.0}

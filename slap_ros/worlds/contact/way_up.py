@@ -20,23 +20,20 @@ RISE = 0.3  # m, more than anything on a table is high
 Boxes = tuple[OrientedBox, ...]  # around the same part
 
 
-def way_up_is_free(
-    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement, margin: float = MARGIN
-) -> bool:
+def way_up_is_free(scene: ContactScene, snapshot: ContactSnapshot, placement: Placement) -> bool:
     """Whether a hand can go straight up without touching anything, its fingers as they are.
 
     Args:
         scene: Bodies of the scene.
         snapshot: Physics of the state.
         placement: Poses of the bodies that do not move.
-        margin: Least distance from what the hand passes, m.
 
     Returns:
         True also where it holds something, which goes up with it.
     """
     if snapshot.held is not None:
         return True
-    swept = [_swept(box, margin) for box in snapshot.hand.boxes()]
+    swept = [_swept(box) for box in snapshot.hand.boxes()]
     shaft = _Shaft.around(swept)
     return not any(
         all(box.overlaps(way) for box in boxes)
@@ -45,11 +42,11 @@ def way_up_is_free(
     )
 
 
-def _swept(box: OrientedBox, margin: float) -> OrientedBox:
+def _swept(box: OrientedBox) -> OrientedBox:
     """What a box of a hand that points down passes through on its way up, less its lowest part."""
     (x, y, z), turn = box.pose
     length, width, height = box.half
-    half = (length + margin, width + margin, height + 0.5 * (RISE - TIP))
+    half = (length + MARGIN, width + MARGIN, height + 0.5 * (RISE - TIP))
     return OrientedBox(Pose((x, y, z + 0.5 * (RISE + TIP)), turn), half)
 
 
