@@ -98,6 +98,15 @@ CONSTRUCTS = {
         problem("(p a) (p b)", "(and (not (p a)) (not (p c)))"),
         ["act(a)"],
     ),
+    "an operator that only does what should not hold": (
+        domain(
+            act("(not (p ?x))", "()", "?x")
+            + "(:action spoil :parameters (?x) :precondition (q ?x) :effect (p ?x))"
+            + "(:action stop :parameters (?x) :precondition (q ?x) :effect (not (q ?x)))"
+        ),
+        problem("(p a) (q a)", "(not (p a))"),
+        ["act(a)"],
+    ),
     "disjunctions": (
         domain(
             act("(q ?x)", "(or (p ?x) (r ?x ?x) (and (p b) (p c)))", "?x"),

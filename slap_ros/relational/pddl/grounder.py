@@ -384,9 +384,11 @@ class _Assembly:
         atoms = sorted({symbol // 2 for symbol in self._relevant if symbol >= 0})
         self._bits: dict[int, int] = {}  # of symbols
         self._atom_bits: dict[int, int] = {}
-        self._complemented = size = 0
+        self._wanted = self._complemented = size = 0  # atoms that ought to hold, or not to
         for atom in atoms:
             self._bits[2 * atom] = self._atom_bits[atom] = 1 << size
+            if 2 * atom in self._relevant:
+                self._wanted |= 1 << size
             size += 1
             if 2 * atom + 1 in self._relevant:
                 self._bits[2 * atom + 1] = 1 << size
@@ -458,7 +460,8 @@ class _Assembly:
     def _actions(self) -> Iterator[GroundAction]:
         for instance in self._instances:
             effects = tuple(self._effects(instance))
-            if any(e.added | (e.deleted & self._complemented) for e in effects):
+            # One that only spoils things is of no use, and what it needs has no bits.
+            if any((e.added & self._wanted) | (e.deleted & self._complemented) for e in effects):
                 precondition = self._mask(instance.precondition)
                 yield GroundAction(instance.name, precondition, effects, instance.cost)
 
