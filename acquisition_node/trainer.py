@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from tempfile import TemporaryFile
 from threading import Timer
 from typing import IO, Any
@@ -63,7 +62,8 @@ class Trainer:
                     process.terminate()
                 assert process.stdout is not None
                 for line in process.stdout:
-                    _hand_over(line, on_event)
+                    if (event := _event(line)) is not None:
+                        on_event(event)
             self._process = None
             if process.returncode and not self._stopped:
                 raise _failure(process.returncode, _end_of(said))
@@ -79,12 +79,13 @@ class Trainer:
             timer.start()
 
 
-def _hand_over(line: bytes, on_event: Callable[[Event], None]) -> None:
-    """Pass an event on; a line that was cut as the process was killed is none."""
-    with suppress(ValueError):
+def _event(line: bytes) -> Event | None:
+    """The event in a line; None where it has none, as one that a killed process has cut."""
+    try:
         event = json.loads(line)
-        if isinstance(event, dict) and "event" in event:
-            on_event(event)
+    except ValueError:
+        return None
+    return event if isinstance(event, dict) and "event" in event else None
 
 
 def _end_of(said: IO[bytes]) -> str:

@@ -38,8 +38,9 @@ def divided_worlds(domain: Domain, make_domain: Callable[[], Domain]) -> Iterato
         here, there = states[:half], states[half:]
         if not there:
             return domain.make_vector_world(here)
+        number = next(numbers)  # the other process counts them too, whatever becomes of those here
         send(link, _Made(there))
-        return _DividedWorlds(domain.make_vector_world(here), there, link, next(numbers))
+        return _DividedWorlds(domain.make_vector_world(here), there, link, number)
 
     with linked_process(_serve, make_domain) as link:
         yield make

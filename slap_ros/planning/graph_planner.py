@@ -147,6 +147,7 @@ class GraphPlanner:
 
         Raises:
             UnsolvableError: No operators lead to the goal.
+            PlanningLimitError: There are too many abstract states.
         """
         start = self.problem.model.space.abstract(state)
         for extra_depth in range(self.max_extra_depth + 1):

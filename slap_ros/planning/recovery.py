@@ -70,7 +70,7 @@ class Recovery:
             rollout = model.roll_out(last.option, there, target)
             if rollout.steps == 0 or not rollout.reached:
                 continue  # it does nothing, or something else by the time it gets there
-            with suppress(UnsolvableError):
+            with suppress(UnsolvableError, PlanningLimitError):
                 _, outcome = search_to(rollout.final, self.goal)
                 if outcome.plan is not None:
                     aside = PlanEdge(last.option, target, rollout.steps)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
@@ -32,6 +33,19 @@ from slap_ros.shortcuts.sac_settings import ShortcutSacSettings
 REPORTED_STEPS = 2_000  # environment steps between reports
 RECENT_ROWS = 64  # rows of the replay buffer over which the noise is measured
 LEAST_STD = 1e-3  # of an action's noise, where the range is 2
+
+
+def recent_observations(buffer: ReplayBuffer) -> NDArray[np.float32]:
+    """The last observations of a replay buffer, shape (n, size); of an empty one, zeros.
+
+    Args:
+        buffer: Replay buffer, whose rows are written in turn.
+    """
+    written = buffer.buffer_size if buffer.full else buffer.pos
+    rows = min(max(written, 1), RECENT_ROWS)
+    # A full buffer begins again with its first row: before that one is the last.
+    seen: NDArray[np.float32] = buffer.observations[np.arange(buffer.pos - rows, buffer.pos)]
+    return seen.reshape(-1, seen.shape[-1])
 
 
 class _ReportCallback(BaseCallback):
@@ -108,10 +122,9 @@ class SacLearner:
         """Standard deviation of each action's noise, mean over recent observations."""
         buffer = self._sac.replay_buffer
         assert buffer is not None
-        rows = range(max(0, buffer.pos - RECENT_ROWS), max(1, buffer.pos))
-        seen = buffer.observations[rows.start : rows.stop]
+        seen = recent_observations(buffer)
         with torch.no_grad():
-            flat = torch.as_tensor(seen.reshape(-1, seen.shape[-1]))
+            flat = torch.as_tensor(seen)
             mean, log_std, _ = self._sac.actor.get_action_dist_params(flat)
             # of the squashed action, to first order
             spread = torch.exp(log_std) * (1.0 - torch.tanh(mean) ** 2)

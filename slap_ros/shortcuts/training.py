@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from statistics import fmean
 from typing import Any, Protocol, TypeVar
@@ -36,6 +37,7 @@ from slap_ros.shortcuts.work_folder import attempt_folder
 from slap_ros.versions import processor, versions
 
 Result = TypeVar("Result")
+MAX_NAME = 245  # bytes of a result's name: with what a draft of its file has besides, 255
 UNRECORDED = "why was not recorded"  # in work folders of version 0.1.0
 
 
@@ -497,10 +499,9 @@ class Training:
     def _plan(self, tasks: Sequence[int], shortcuts: tuple[Shortcut, ...]) -> list[int | str]:
         """Steps of a plan for each of these validation tasks, or why there is none."""
         work = [(self._any_goal, i, shortcuts, self.settings.sampling) for i in tasks]
-        name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
         return cached_jobs(
             self._work,
-            name,
+            plans_name([shortcut.name for shortcut in shortcuts]),
             lambda finished: self._run("planning", jobs.plan_length, work, finished),
             lambda data: _decode_lengths(data, len(work)),
         )
@@ -541,6 +542,18 @@ class Training:
             "versions": dict(versions()),
             "processor": processor(),
         }
+
+
+def plans_name(shortcuts: Sequence[str]) -> str:
+    """The name of the file of plans with shortcuts, which has their names as long as it can.
+
+    Args:
+        shortcuts: Names of the shortcuts.
+    """
+    name = "+".join(["plans", *shortcuts])
+    if len(name.encode()) <= MAX_NAME:
+        return name
+    return f"plans+{sha256(name.encode()).hexdigest()}"
 
 
 def _decode_lengths(data: Any, count: int) -> list[int | str]:

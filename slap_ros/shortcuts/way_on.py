@@ -88,7 +88,13 @@ class WayOn:
 
 def _through(edge: Edge, to_go: list[float], operator_steps: Mapping[str, float]) -> float:
     """Estimated environment steps to a goal by an edge."""
-    return operator_steps.get(edge.option.skill.name, 0.0) + to_go[edge.target]
+    return _steps_of(edge, operator_steps) + to_go[edge.target]
+
+
+def _steps_of(edge: Edge, operator_steps: Mapping[str, float]) -> float:
+    """Mean environment steps of an edge's operator; without one, the mean of the others."""
+    known = operator_steps.get(edge.option.skill.name)
+    return float(np.mean(list(operator_steps.values()) or [1.0])) if known is None else known
 
 
 def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> list[float]:
@@ -96,7 +102,6 @@ def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
 
     Operators count with their mean, and those without one with the mean of the others.
     """
-    usual = float(np.mean(list(operator_steps.values()) or [1.0]))
     incoming: list[list[Edge]] = [[] for _ in graph.nodes]
     for edge in graph.edges:
         incoming[edge.target].append(edge)
@@ -109,7 +114,7 @@ def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
         if rest > to_go[node]:
             continue
         for edge in incoming[node]:
-            longer = rest + operator_steps.get(edge.option.skill.name, usual)
+            longer = rest + _steps_of(edge, operator_steps)
             if longer < to_go[edge.source]:
                 to_go[edge.source] = longer
                 heapq.heappush(queue, (longer, edge.source))

@@ -52,6 +52,18 @@ def test_a_state_that_the_other_process_refuses_is_an_error_here():
             divided.step(np.zeros((len(STARTS), len(DOMAIN.action_space.axes))))
 
 
+def test_worlds_that_are_refused_here_do_not_shift_those_there():
+    bad = State(STARTS[0].layout, np.full_like(STARTS[0].data, np.nan))
+    hold = np.zeros((2, len(DOMAIN.action_space.axes)))
+    with divided_worlds(DOMAIN, MAKE_DOMAIN) as make_worlds:
+        with pytest.raises(InvalidStateError):
+            make_worlds([bad, STARTS[0]])
+        first, second = make_worlds(STARTS[1:3]), make_worlds(STARTS[3:5])
+        for worlds, states in ((first, STARTS[1:3]), (second, STARTS[3:5])):
+            expected = DOMAIN.make_vector_world(states).step(hold)
+            np.testing.assert_array_equal(worlds.step(hold).data, expected.data)
+
+
 def test_a_process_that_was_killed_is_noticed():
     with divided_worlds(DOMAIN, MAKE_DOMAIN) as make_worlds:
         divided = make_worlds(STARTS)

@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 
 from slap_ros.core import ActionSpace, Domain, Execution, Task
-from slap_ros.errors import ErrorCode, UnsolvableError
+from slap_ros.errors import ErrorCode, PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import solve
 from slap_ros.planning.abstract_graph import build_unrolled_graph
+from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import Problem
+from slap_ros.planning.recovery import Recovery
 from slap_ros.relational import (
     Feature,
     Layout,
@@ -206,6 +208,22 @@ def test_a_side_effect_that_does_not_prevent_the_goal_is_planned_for(planner, go
     pull = result.plan.edges[0]
     assert not result.fails and pull.target.exact
     assert set(space.decode(pull.target.required)) == {OPEN(THE_DRAWER), INSIDE(THE_DRAWER)}
+
+
+def test_a_side_effect_after_which_planning_takes_too_long_is_left_alone():
+    """There is more to try, and an error of its own that says why nothing led to the goal."""
+    domain, task = drawer(1, shaky=True)
+    state, space = task.initial_state, domain.atom_space(task.initial_state)
+    goal = space.mask(atom(THE_DRAWER) for atom in (HELD, STANDING))
+    planner = GraphPlanner(Problem.of(replace(domain, exact=True), state))
+    graph, outcome = planner.search_to(state, goal)
+    recovery = Recovery(planner.problem, graph, state, goal, outcome.failed)
+
+    def too_long(state, goal):
+        raise PlanningLimitError("too many abstract states")
+
+    assert recovery.past_side_effect(planner.search_to) is not None
+    assert recovery.past_side_effect(too_long) is None
 
 
 def test_a_side_effect_that_prevents_the_goal_leaves_no_plan():

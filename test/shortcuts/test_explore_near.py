@@ -3,19 +3,21 @@
 """Exploration that comes near objects, and that sees what operators never lead to."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from slap_ros.core import SyncVectorWorld
 from slap_ros.domains import get_domain
-from slap_ros.planning.abstract_graph import Edge
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.model import Model
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import Vertex
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import Column, State
+from slap_ros.shortcuts import way_on
 from slap_ros.shortcuts.exploration_policies import PUSH, PushAim
 from slap_ros.shortcuts.explore import Explorer, ShortcutCandidate
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
@@ -30,6 +32,7 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.scripted_skill import ScriptedSkill
 
 SEED = 1_000_000  # of tasks for training
+GOAL = 1  # a mask
 FEW = ExplorationSettings(rollouts=4, length=30, nodes=1)
 NEAR = replace(FEW, pushes=1, beyond=True)
 
@@ -155,16 +158,37 @@ def test_the_way_on_is_executed_and_there_is_none_where_operators_lead_nowhere(b
     task = blocked.task(SEED, 0)
     state, problem = task.initial_state, Problem.of(blocked, task.initial_state)
     space, steps = problem.model.space, dict.fromkeys(blocked.skills, 20.0)
-    way_on = WayOn(problem, space.mask(task.goal))
+    way = WayOn(problem, space.mask(task.goal))
     start = space.abstract(state)
-    measured = way_on.measure(state, start, steps)
+    measured = way.measure(state, start, steps)
     plan = GraphPlanner(problem).plan(state, space.mask(task.goal)).plan
-    assert plan.predicted_steps <= measured == way_on.steps < NO_WAY
-    assert way_on.measure(state, 0, steps) == NO_WAY  # nothing holds, so no operator applies
+    assert plan.predicted_steps <= measured == way.steps < NO_WAY
+    assert way.measure(state, 0, steps) == NO_WAY  # nothing holds, so no operator applies
     # Where the skill that comes next fails, there is no way: here its cube is out of reach.
     cube = state.layout.object("cube2")
     elsewhere = state.replace({(cube, "x"): 1.1, (cube, "z"): 0.02})
-    assert way_on.measure(elsewhere, start, steps) == NO_WAY
+    assert way.measure(elsewhere, start, steps) == NO_WAY
+
+
+@pytest.mark.parametrize(("steps", "taken"), [(5.0, "known"), (9.0, "rare")])
+def test_an_operator_that_was_never_executed_looks_as_cheap_as_the_others(
+    monkeypatch, steps, taken
+):
+    """Two operators lead to the goal; the mean of all that were executed is 7 steps."""
+    skills = (SimpleNamespace(name=name, step_limit=20) for name in ("known", "rare"))
+    options = (SimpleNamespace(skill=skill, target=lambda node: node) for skill in skills)
+    graph = AbstractGraph(GOAL, [0, GOAL], [0, 1], [Edge(0, 1, option) for option in options])
+    monkeypatch.setattr(way_on, "build_abstract_graph", lambda *_, **__: graph)
+    begun = []
+
+    def roll_out(option, state, target):
+        begun.append(option.skill.name)
+        return SimpleNamespace(steps=3, reached=True, final=state)
+
+    problem = SimpleNamespace(model=SimpleNamespace(roll_out=roll_out), operators=())
+    costs = {"known": steps, "elsewhere": 14.0 - steps}
+    assert WayOn(problem, GOAL).measure(None, 0, costs) == 3.0
+    assert begun == [taken]
 
 
 def test_more_atoms_may_hold_where_a_shortcut_over_acquired_skills_ends(blocked):

@@ -13,7 +13,9 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.finished_jobs import cached_jobs
 from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import SequentialWorkers, ray_workers
 from slap_ros.shortcuts import training
 from slap_ros.shortcuts.explore import ExplorationResult, ShortcutCandidate
@@ -22,7 +24,7 @@ from slap_ros.shortcuts.settings import POLISH, ExplorationSettings, training_se
 from slap_ros.shortcuts.shortcut_library import load_library, load_shortcut, save_library
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.stopping import Stopping
-from slap_ros.shortcuts.training import CandidateGroup, Training, rank
+from slap_ros.shortcuts.training import CandidateGroup, Training, plans_name, rank
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
 from support.programs import PATH, environment
@@ -190,6 +192,19 @@ def test_exploration_goes_on_after_the_last_task_that_was_explored(tmp_path):
         for work in ("whole", "work")
     )
     assert json.dumps(whole) == json.dumps(resumed)
+
+
+@pytest.mark.parametrize("shortcuts", [0, 1, 4, 8, 40])
+def test_plans_with_many_shortcuts_have_a_file(tmp_path, shortcuts):
+    """Its name has theirs, as long as a file can have such a name."""
+    names = [f"GripperEmpty_On_Overlap-{number:08x}" for number in range(shortcuts)]
+    of_each = {plans_name(names[:count]) for count in range(shortcuts + 1)}
+    assert len(of_each) == shortcuts + 1
+    work = WorkFolder(tmp_path)
+    for name in of_each:
+        assert cached_jobs(work, name, lambda finished: finished.of("planning"), dict) == {}
+    assert plans_name(names[:4]) == "+".join(["plans", *names[:4]])
+    assert (tmp_path / f"{plans_name(names)}.json").exists()
 
 
 KILLED = """
