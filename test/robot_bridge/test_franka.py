@@ -4,6 +4,7 @@
 
 import json
 import os
+import signal
 import socket
 import struct
 import subprocess
@@ -187,6 +188,37 @@ def test_a_robot_with_another_version_is_named(simulation):
 def test_a_robot_that_is_not_there_is_named(simulation):
     with pytest.raises(RobotUnreachableError, match="FCI"):
         FrankaArm(settings("127.78.0.2"))
+
+
+@pytest.mark.slow  # starts a simulation of its own
+def test_a_late_answer_to_a_motion_does_not_end_the_next():
+    """Sent before the Move, and read together with it, as on a machine that has other work."""
+    pytest.importorskip("franky_sim", reason=NO_WHEEL)
+    from franky_sim.franka_robot_protocol import MoveCommand, MoveStatus, RobotCommand, UDPCommand
+
+    with (
+        SimulatedFr3(HOME) as own,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as states,
+        socket.create_connection((own.ip, 1337), LIMIT) as commands,
+    ):
+        states.bind(("", 0))
+        states.settimeout(LIMIT)
+        commands.settimeout(LIMIT)
+        commands.sendall(struct.pack("<IIIHH", 0, 1, 16, 10, states.getsockname()[1]))
+        assert len(commands.recv(20, socket.MSG_WAITALL)) == 20
+        _, control = states.recvfrom(65536)
+        zeros = [0.0] * 38
+        late = UDPCommand.STRUCT.pack(9, *zeros, False, True, *zeros[:7], False)  # has ended
+        own._process.send_signal(signal.SIGSTOP)
+        states.sendto(late, control)
+        move = MoveCommand.STRUCT.pack(0, 0, *zeros[:6])
+        commands.sendall(struct.pack("<III", RobotCommand.kMove, 2, 12 + len(move)) + move)
+        own._process.send_signal(signal.SIGCONT)
+        answer = struct.unpack("<IIIB", commands.recv(13, socket.MSG_WAITALL))
+        assert answer == (RobotCommand.kMove, 2, 13, MoveStatus.kMotionStarted)
+        commands.settimeout(1.0)
+        with pytest.raises(TimeoutError):
+            commands.recv(13)  # that it has ended
 
 
 @pytest.mark.slow  # starts a simulation of its own

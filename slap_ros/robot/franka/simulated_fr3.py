@@ -76,6 +76,9 @@ class Fr3Server(FrankaRobotServer):  # type: ignore[misc]  # franky-sim has no t
         """Begin a motion, unless a reflex has stopped the arm."""
         if self.error is not None:
             raise RuntimeError("stopped by a reflex")
+        # A driver answers each state that shows the motion before, to end it: such an answer may
+        # still wait here, and would end this motion, as franky-sim reads it after the Move.
+        self._process_udp_commands()
         self._in_control, self._unanswered = False, 0
         super().start_motion(*given)
         # A robot begins where its control holds it; franky-sim would begin where it is measured,
