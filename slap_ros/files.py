@@ -9,6 +9,7 @@ written goes through here where another process may read or write it meanwhile.
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import fcntl
 import json
@@ -34,6 +35,7 @@ MAX_YAML_DEPTH = 100  # collections within collections; document and stream coun
 MAX_YAML_NODES = 200_000  # with what is repeated by reference counted as often as it is repeated
 # What PyYAML raises where a scalar is not of the kind that its tag says, beside its own errors.
 SCALAR_ERRORS = (RecursionError, LookupError, TypeError, AttributeError)
+AT_FDCWD, RENAME_EXCHANGE = -100, 2  # of Linux: <fcntl.h>, <linux/fs.h>
 KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -180,6 +182,21 @@ def draft_beside(path: Path) -> Iterator[Path]:
     finally:  # after Ctrl-C too
         with suppress(OSError):
             _remove(draft)
+
+
+def exchange(one: Path, other: Path) -> None:
+    """Let what is at two paths change places, at once for whoever looks.
+
+    Raises:
+        OSError: The kernel or the file system cannot, or there is nothing at one of them.
+    """
+    libc = ctypes.CDLL(None, use_errno=True)
+    if not hasattr(libc, "renameat2"):
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS), str(one))
+    names = os.fsencode(one.absolute()), os.fsencode(other.absolute())
+    if libc.renameat2(AT_FDCWD, names[0], AT_FDCWD, names[1], RENAME_EXCHANGE) != 0:
+        code = ctypes.get_errno()
+        raise OSError(code, os.strerror(code), str(one), None, str(other))
 
 
 def _remove(path: Path) -> None:

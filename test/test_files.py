@@ -3,10 +3,12 @@
 """Whatever a name stands for: every reader ends, with an error that says why."""
 
 import ast
+import errno
 import os
 import socket
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -24,7 +26,8 @@ from slap_ros.language.cassette import read_cassette
 from slap_ros.language.settings import read_settings
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.meshes.decomposition import load_mesh
-from slap_ros.policies.library_files import ABOUT
+from slap_ros.policies import library_files
+from slap_ros.policies.library_files import ABOUT, replace_folder
 from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.shortcuts.shipped import require_usable
 from slap_ros.shortcuts.shortcut_library import load_library
@@ -190,6 +193,49 @@ def test_what_there_is_no_room_for_is_named_and_leaves_what_was_there(tmp_path):
     assert run.stdout == f"{path}\n", run.stderr
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def with_content(content):
+    return lambda draft: (draft / ABOUT).write_text(content)
+
+
+def test_a_folder_that_is_replaced_is_there_at_every_moment(tmp_path):
+    folder, missed, done = tmp_path / "library", [], threading.Event()
+    replace_folder(folder, with_content("0"))
+
+    def look():
+        while not done.is_set():
+            try:
+                (folder / ABOUT).read_text()
+            except FileNotFoundError as error:
+                missed.append(error)
+
+    looker = threading.Thread(target=look)
+    looker.start()
+    for i in range(300):
+        replace_folder(folder, with_content(f"{i}"))
+    done.set()
+    looker.join()
+    assert not missed
+    assert (folder / ABOUT).read_text() == "299"
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize("code", [errno.EINVAL, errno.EIO])
+def test_a_folder_is_replaced_where_nothing_can_change_places(tmp_path, monkeypatch, code):
+    def cannot(one, other):
+        raise OSError(code, os.strerror(code), str(one))
+
+    folder = tmp_path / "library"
+    replace_folder(folder, with_content("old"))
+    monkeypatch.setattr(library_files, "exchange", cannot)
+    if code == errno.EIO:
+        with pytest.raises(OSError, match=os.strerror(code)):
+            replace_folder(folder, with_content("new"))
+    else:
+        replace_folder(folder, with_content("new"))
+    assert (folder / ABOUT).read_text() == ("old" if code == errno.EIO else "new")
+    assert list(tmp_path.iterdir()) == [folder]
 
 
 def test_nobody_opens_files_in_other_ways():

@@ -7,6 +7,7 @@ A policy is a file of safetensors, what is known of it a JSON object, a library 
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -21,11 +22,12 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from slap_ros.errors import InvalidLibraryError
-from slap_ros.files import parse_json, read_bytes, read_text
+from slap_ros.files import exchange, parse_json, read_bytes, read_text
 from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 
 ABOUT = "library.json"
+CANNOT_EXCHANGE = {errno.ENOSYS, errno.EINVAL, errno.ENOTSUP}  # as some file systems say
 SKILL, SHORTCUT = "skill.json", "shortcut.json"  # files with facts about a member, by its kind
 TANH = "tanh"  # between the layers of PPO's and of clones
 KINDS = {SKILL: "skills", SHORTCUT: "shortcuts"}
@@ -36,7 +38,9 @@ Member = TypeVar("Member")
 def replace_folder(path: Path, write: Callable[[Path], None]) -> None:
     """Write a folder in place of the one that may be there.
 
-    It is written beside and then moved, so that there always is a whole one.
+    It is written beside it, and then both change places: there always is a whole one. Where the
+    file system cannot do that, there is none for a moment, and a process that is killed then leaves
+    the old one beside it, as ``.NAME.PID.old``.
 
     Args:
         path: Path of the folder.
@@ -45,19 +49,33 @@ def replace_folder(path: Path, write: Callable[[Path], None]) -> None:
     path = path.resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    old = path.with_name(f".{path.name}.{os.getpid()}.old")
     shutil.rmtree(draft, ignore_errors=True)
     try:
         draft.mkdir()
         write(draft)
         if path.exists():
-            path.rename(old)
-        draft.rename(path)
+            _exchange(draft, path)
+        else:
+            draft.rename(path)
     finally:  # after Ctrl-C too
-        if old.exists() and not path.exists():
-            old.rename(path)
-        for left in (draft, old):
-            shutil.rmtree(left, ignore_errors=True)
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _exchange(draft: Path, path: Path) -> None:
+    """Let two folders change places, one after the other where the file system has no other way."""
+    try:
+        exchange(draft, path)
+    except OSError as error:
+        if error.errno not in CANNOT_EXCHANGE:
+            raise
+        old = draft.with_suffix(".old")
+        try:
+            path.rename(old)
+            draft.rename(path)
+        finally:
+            if old.exists() and not path.exists():
+                old.rename(path)
+            shutil.rmtree(old, ignore_errors=True)
 
 
 def write_library(

@@ -60,3 +60,5 @@ def test_the_interval_of_a_mean_of_few_values_is_students():
     interval = mean_interval([1.0, 2.0, 3.0])
     assert (interval.low, interval.high) == pytest.approx((-0.4841, 4.4841), abs=1e-3)
     assert mean_interval([1.0]) is None
+    halves = [mean_interval([0.0, 1.0] * n).high - 0.5 for n in range(1, 20)]
+    assert halves == sorted(halves, reverse=True)  # with any number of values
