@@ -64,11 +64,12 @@ COLUMNS = (
 TABLE = """\
 Length is the mean over solved tasks, with the sample standard deviation over tasks, and over the
 means of the libraries. Relative length is over that of pure planning, on tasks that both solved;
-its 95 % interval is from a bootstrap over tasks. Success has Wilson's 95 % interval. Replans are
-the mean over all tasks. In a row with shortcuts, every library solves every task. No library was
-chosen by its figures here. Rows that are the paper's are from its own simulator, whose baseline has
-other lengths. Seconds of planning are per task; they depend on the machine that made this page and
-on what else it did."""
+its 95 % interval is from a bootstrap over tasks. Success has Wilson's 95 % interval as if the
+trials of several libraries were independent; since they share the tasks, it is rather too narrow.
+Replans are the mean over all tasks. In a row with shortcuts, every library solves every task. No
+library was chosen by its figures here. Rows that are the paper's are from its own simulator, whose
+baseline has other lengths. Seconds of planning are per task; they depend on the machine that made
+this page and on what else it did."""
 
 
 @dataclass(frozen=True)

@@ -49,13 +49,14 @@ MEASURED = """\
 Every task is planned and executed in the world. Length is the number of environment steps executed.
 A task that equals an earlier one is left out. In a row with shortcuts, every library solves every
 task. Each library was trained with another seed, and no library was chosen by its figures here.
-Success has Wilson's 95 % interval. Length is the mean over solved tasks, with the sample standard
-deviation over tasks, and over the means of the libraries. Relative length is the sum of lengths
-over that of pure planning, on tasks that both solved; its 95 % interval is from a bootstrap over
-tasks. "Search without learning" tries random actions as often as SLAP tries its policies, between
-the same pairs of abstract states. Libraries with the same pairs share it. "Out of steps" is the
-number of tasks that ran out of steps, at the domain's step limit. Seconds of planning are per task;
-they depend on the machine that made this page and on what else it did."""
+Success has Wilson's 95 % interval as if the trials of several libraries were independent; since
+they share the tasks, it is rather too narrow. Length is the mean over solved tasks, with the sample
+standard deviation over tasks, and over the means of the libraries. Relative length is the sum of
+lengths over that of pure planning, on tasks that both solved; its 95 % interval is from a bootstrap
+over tasks. "Search without learning" tries random actions as often as SLAP tries its policies,
+between the same pairs of abstract states. Libraries with the same pairs share it. "Out of steps" is
+the number of tasks that ran out of steps, at the domain's step limit. Seconds of planning are per
+task; they depend on the machine that made this page and on what else it did."""
 
 
 @dataclass(frozen=True)
