@@ -33,6 +33,7 @@ from slap_ros.evaluation.run_log import RunLog
 from slap_ros.relational import GroundAtom
 
 FOLLOWED = (DOMAIN, TASK, STATE, ATOMS, PLAN, PLAN_EVENTS, SKILL_EVENTS)
+HIDDEN = "_"  # what the names of hidden nodes begin with
 OnMessage = Callable[[str, Any], None]  # message type, message
 
 
@@ -86,12 +87,15 @@ class RunClient(Node):
             subscribe(self, topic, callback)
 
     def other_nodes(self) -> list[str]:
-        """Names of the other nodes in this namespace."""
+        """Names of the other nodes in this namespace, hidden ones left out.
+
+        The ``ros2`` command's own nodes are hidden. Its daemon stays for hours after a command.
+        """
         here = self.get_namespace()
         return [
             name
             for name, namespace in self.get_node_names_and_namespaces()
-            if namespace == here and name != self.get_name()
+            if namespace == here and name != self.get_name() and not name.startswith(HIDDEN)
         ]
 
     def ready(self, recording: bool) -> bool:

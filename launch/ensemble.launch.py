@@ -57,7 +57,9 @@ ROBOTS = {  # nodes that are a robot or drive one, by world
     "franka": "franka_driver",
     "franka-sim": "franka_driver",
 }
-CHOICES = {"world": ["sim", "robot", *ROBOTS], "camera": ["true", "false"]}
+CHOICES = {"world": ["sim", "robot", *ROBOTS]} | {
+    name: ["true", "false"] for name in ("acquisition", "camera", "rviz")
+}
 # Parameter files that go before ensemble.yaml and robot.yaml, by world.
 CONFIGURED = {
     "mujoco": ["mujoco.yaml"],
@@ -119,8 +121,9 @@ def generate_launch_description() -> LaunchDescription:
         )
         for name, (_, description) in PARAMETERS.items()
     ]
+    # RViz first: where it is not installed, launch fails and would leave nodes behind.
     return LaunchDescription(
-        [*arguments, *_discovery_range(), OpaqueFunction(function=_nodes), _rviz()]
+        [*arguments, *_discovery_range(), _rviz(), OpaqueFunction(function=_nodes)]
     )
 
 

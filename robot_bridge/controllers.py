@@ -74,7 +74,12 @@ class Controllers:
     @property
     def ready(self) -> bool:
         """Whether both controllers are there."""
-        return bool(self._arm.server_is_ready() and self._gripper.server_is_ready())
+        return not self.missing
+
+    @property
+    def missing(self) -> list[str]:
+        """Names of the actions that no controller offers."""
+        return [name for client, name in self._names.items() if not client.server_is_ready()]
 
     async def follow(self, points: Sequence[TrajectoryPoint]) -> None:
         """Move the arm through points; their limits were checked when they were made.

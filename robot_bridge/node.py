@@ -81,7 +81,7 @@ from ensemble import encode
 from ensemble.endpoints import advertise
 from ensemble.entry_point import run_node
 from ensemble.interfaces import MARKERS
-from ensemble.lockstep_world import LockstepWorld
+from ensemble.lockstep_world import QUIET, LockstepWorld
 from ensemble.robot_parameters import RobotBridgeParameters
 from ensemble.steady_time import create_timer
 from robot_bridge.robot import Robot
@@ -226,8 +226,11 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     def _poll(self) -> None:
         """Whatever time brings: a state, or a sensor that has become silent."""
-        if self._phase is Phase.STARTING and self._robot.controllers.ready:
-            self._start()
+        if self._phase is Phase.STARTING:
+            if missing := self._robot.controllers.missing:
+                self._report_missing(missing)
+            else:
+                self._start()
         elif self._phase is Phase.READY and self._horizon.commands and self._is_idle:
             self._move(expected=True)
         elif self._phase in (Phase.MOVING, Phase.LOOKING):
@@ -256,6 +259,15 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         self._next = None
 
     # -- episodes -------------------------------------------------------------------------------
+
+    def _report_missing(self, controllers: list[str]) -> None:
+        """Say what is waited for. It is no fault: a robot may be started after the bridge."""
+        if self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout:
+            self.get_logger().warning(
+                f"not yet: no controller offers {', '.join(controllers)}: is it running, and are "
+                "arm, trajectory_action and gripper_action right?",
+                throttle_duration_sec=QUIET,
+            )
 
     def _start(self) -> None:
         try:

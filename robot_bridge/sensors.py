@@ -60,10 +60,8 @@ class Sensors:
 
     def _on_joints(self, message: JointState) -> None:
         """The arm's joints, the fingers', or both; others are ignored."""
-        stamp_s = self._stamp_s(message.header)
-        if stamp_s is None:
-            return
         try:
+            stamp_s = self._stamp_s(message.header)
             joints = JointLists(message.name, message.position, message.velocity, message.effort)
             self._take_fingers(joints.position, stamp_s)
             self._take_arm(joints, stamp_s)
@@ -84,6 +82,8 @@ class Sensors:
         positions = tuple(at[name] for name in self._arm)
         require_radians(positions, self._limits.low, self._limits.high)
         velocities = tuple(speed[name] for name in self._arm if name in speed)
+        if all(map(math.isnan, velocities)):
+            velocities = ()  # ros2_control's joint_state_broadcaster: not measured
         self._world.add_joint_reading(JointReading(stamp_s, positions, velocities, self.gap))
         self.joint_refusal = None
         self.counts["readings"] += 1
@@ -102,14 +102,12 @@ class Sensors:
             base = self._frames.in_base(item.header.frame_id)
             if base is None:
                 continue  # not seen from the robot
-            stamp_s = self._stamp_s(item.header)
-            if stamp_s is None:
-                continue
-            if item.child_frame_id == SEARCHED:
-                self._world.add_picture(stamp_s)
-                continue
             position, quaternion = _parts(item)
             try:
+                stamp_s = self._stamp_s(item.header)
+                if item.child_frame_id == SEARCHED:
+                    self._world.add_picture(stamp_s)
+                    continue
                 self._world.add_detection(
                     item.child_frame_id, stamp_s, base, Pose(position, quaternion)
                 )
@@ -118,24 +116,24 @@ class Sensors:
             else:
                 self.counts["detections"] += 1
 
-    def _stamp_s(self, header: Header) -> float | None:
-        """When something was measured, s of ``clock``; None where that is unknown or to come.
+    def _stamp_s(self, header: Header) -> float:
+        """When something was measured, s of ``clock``.
 
         From a clock that is ahead, what is older than the last motion would look newer.
+
+        Raises:
+            InvalidMeasurementError: That is unknown or to come.
         """
+        of = f"a measurement of {header.frame_id or 'joints'}"
         if stamp_ns(header) == 0 or not 0 <= header.stamp.nanosec < NANOSECONDS:
-            self._refuse(
-                InvalidMeasurementError(f"a measurement of {header.frame_id} has no stamp")
-            )
-            return None
+            raise InvalidMeasurementError(f"{of} has no stamp")
         stamp_s = self._clock.of_stamp(stamp_ns(header) / NANOSECONDS)
         ahead_s = stamp_s - self._clock.now_s()
-        if ahead_s <= AHEAD:
-            return stamp_s
-        self._refuse(
-            InvalidMeasurementError(f"a measurement of {header.frame_id} is {ahead_s:.3f} s ahead")
-        )
-        return None
+        if ahead_s > AHEAD:
+            raise InvalidMeasurementError(
+                f"{of} is {ahead_s:.3f} s ahead: are clocks synchronised?"
+            )
+        return stamp_s
 
     def _refuse(self, error: InvalidMeasurementError) -> None:
         self.counts["refused_measurements"] += 1

@@ -47,6 +47,13 @@ class RecordedEpisode:
     exact: set[int] = field(default_factory=set)  # steps of atoms that can be found again
     commands: dict[int, list[CommandMessage]] = field(default_factory=dict)  # in order of arrival
 
+    @property
+    def objects(self) -> list[tuple[str, str]]:
+        """Name and type of each object, those of all its states; empty where it has none yet."""
+        if self.task is not None:
+            return _names(self.task.initial_state)
+        return next(map(_names, self.states.values()), [])
+
 
 class Recording:
     """Collects the messages of an ensemble by episode."""
@@ -57,7 +64,7 @@ class Recording:
         self.markers: dict[int, MarkersMessage] = {}  # by stamp, ns
         self.acquisition: list[AcquisitionEventMessage] = []  # in order of arrival
         self.not_finite = 0  # states
-        self.contradicting = 0  # states of a step of which there is another
+        self.contradicting = 0  # states of which there is another, or of others' objects
         self._add: Mapping[str, Callable[[Any], None]] = {
             DOMAIN_INFO: self._add_domain,
             TASK: self._add_task,
@@ -103,13 +110,18 @@ class Recording:
         self.domain_info = msg
 
     def _add_task(self, msg: TaskMessage) -> None:
-        self._episode(msg.episode).task = msg
+        episode = self._episode(msg.episode)
+        episode.task = episode.task or msg  # as of states, the first counts
 
     def _add_state(self, msg: StateMessage) -> None:
         if not all(isfinite(value) for obj in msg.objects for value in obj.features):
             self.not_finite += 1  # no world publishes it, and no node acts on it
             return
-        kept = self._episode(msg.episode).states.setdefault(msg.step, msg)
+        episode = self._episode(msg.episode)
+        if (objects := episode.objects) and objects != _names(msg):
+            self.contradicting += 1  # of another simulator
+            return
+        kept = episode.states.setdefault(msg.step, msg)
         self.contradicting += kept is not msg and _features(kept) != _features(msg)
 
     def _add_atoms(self, msg: AtomsMessage) -> None:
@@ -149,6 +161,10 @@ class Recording:
                 f"{here} here; read the bag with the version of slap_ros that wrote it"
             )
         return domain
+
+
+def _names(state: StateMessage) -> list[tuple[str, str]]:
+    return [(obj.name, obj.type) for obj in state.objects]
 
 
 def _features(state: StateMessage) -> list[tuple[str, tuple[float, ...]]]:

@@ -9,6 +9,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from slap_ros import load_bag
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, read_episodes, replay_bag
 from slap_ros.bags.demonstrations import read_demonstrations
 from slap_ros.errors import ErrorCode, InvalidParameterError
-from slap_ros.messages.interfaces import STATE
+from slap_ros.messages.interfaces import STATE, TASK
 from slap_ros.report import read_report, render
 from slap_ros.robot.recorded_motion import read_recorded_motion
 from support.truthful_run import Published, Script, record, under
@@ -223,3 +224,28 @@ def test_two_ensembles_on_the_same_topics_are_noticed(
     record(tmp_path / "bag", [*scripts["/"].messages, *scripts["/robot2"].messages])
     damage = evaluate_bag(tmp_path / "bag").damage
     assert damage is not None and "of the same episode and step" in damage
+
+
+def test_a_simulator_that_was_started_again_with_other_objects_is_damage(
+    scripts: Mapping[str, Script], tmp_path: Path
+) -> None:
+    """It begins with episode 1 again, and its task has an object less."""
+    first = scripts["/"].messages
+    second = [
+        replace(item, message=replace(item.message, **{field: fewer(getattr(item.message, field))}))
+        if (field := {STATE: "objects", TASK: "initial_state"}.get(item.type_name))
+        else item
+        for item in scripts["/"].messages
+    ]
+    record(tmp_path / "bag", [*first[: len(first) // 2], *second])
+    found = evaluate_bag(tmp_path / "bag")
+    assert found.damage is not None and "of a simulator that was started again" in found.damage
+    assert 0 < found.states < len([item for item in first if item.type_name == STATE])
+    assert not found.mismatches
+    assert replay_bag(tmp_path / "bag").compared == found.states
+    assert "started again" in render([read_report(tmp_path / "bag")])
+
+
+def fewer(found: Any) -> Any:
+    """A state, or the list of its objects, without the last one."""
+    return found[:-1] if isinstance(found, list) else replace(found, objects=found.objects[:-1])

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import rclpy
 from rcl_interfaces.srv import GetParameters
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ListSkills, ResetTask
@@ -111,6 +112,15 @@ def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order
     assert found.runs[0].success
     assert found.states == found.compared == found.runs[0].plan_length + 1
     assert found.runs[0].bound == result.bound >= 1.0
+
+
+def test_the_daemon_of_the_ros2_command_is_no_other_ensemble(network):
+    with temporary_node(Listener) as (client, spinner):
+        nodes = [rclpy.create_node(name) for name in ("_ros2cli_daemon_7", "neighbour")]
+        assert spinner.spin_until(lambda: bool(client.other_nodes()), LIMIT)
+        assert client.other_nodes() == ["neighbour"]
+        for node in nodes:
+            node.destroy_node()
 
 
 @pytest.mark.parametrize("name", ALL)

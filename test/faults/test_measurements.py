@@ -116,6 +116,31 @@ def test_no_joint_state_is_taken_for_another(sensors, request):
     assert taken > 50 and refused > 50
 
 
+def test_velocities_that_nobody_measures_hinder_nothing(sensors):
+    """As ros2_control's joint_state_broadcaster has them."""
+    lists = {
+        "name": list(TRUE),
+        "position": list(TRUE.values()),
+        "velocity": [math.nan] * len(TRUE),
+    }
+    sensors._on_joints(joint_state(sensors, lists))
+    assert sensors.counts["readings"] == 1 and sensors.joint_refusal is None
+
+
+@pytest.mark.parametrize(
+    ("by_s", "why"), [(5, "s ahead: are clocks synchronised"), (None, "stamp")]
+)
+def test_joints_whose_stamp_cannot_be_are_refused_with_the_reason(sensors, by_s, why):
+    message = joint_state(sensors, {"name": list(TRUE), "position": list(TRUE.values())})
+    if by_s is None:
+        message.header.stamp.sec = message.header.stamp.nanosec = 0
+    else:
+        message.header.stamp.sec += by_s
+    sensors._on_joints(message)
+    assert why in str(sensors.joint_refusal)
+    assert sensors.counts["readings"] == 0 and sensors.counts["refused_measurements"] == 1
+
+
 def test_a_picture_that_shows_nothing_was_searched_if_the_robot_knows_the_camera(sensors):
     pictures = []
     for camera in ("somewhere_else", "panda_link0"):

@@ -315,6 +315,21 @@ def test_a_task_that_cannot_begin_fails_with_what_is_missing(network, hidden, br
     assert failed.value.code == ErrorCode.NO_DETECTION
 
 
+def test_controllers_that_nobody_offers_are_named(network, capfd):
+    chosen = node_parameters(settings(bridge={"arm": "fr3", "detection_timeout": 0.1}))
+    said = []
+
+    def named():
+        said.append(capfd.readouterr().err)
+        return "no controller offers fr3_arm_controller/follow_joint_trajectory" in "".join(said)
+
+    with (
+        temporary_node(lambda: RunClient(lambda *_: None)) as (_, spinner),
+        InProcessLauncher({"robot_bridge": chosen["robot_bridge"]}, spinner.executor),
+    ):
+        assert spinner.spin_until(named, 60.0)
+
+
 @on_both_robots
 def test_an_object_that_is_never_seen_is_named(network, world):
     with lab({"hidden": "block2"}, started=False, world=world) as bench:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the launch file's arguments, a user's parameter file and the shipped one say, in order."""
 
+import shutil
 import subprocess
 import time
 from importlib.util import find_spec
@@ -48,6 +49,8 @@ def test_a_parameter_file_goes_before_defaults_and_arguments_before_the_file(cli
         ("params_file:=nowhere.yaml", "nowhere.yaml"),
         ("world:=moon", "moon"),
         ("camera:=perhaps", "perhaps"),
+        ("acquisition:=perhaps", "perhaps"),
+        ("rviz:=perhaps", "perhaps"),
         ("seed:=x", "seed must be a whole number"),
     ],
 )
@@ -55,6 +58,14 @@ def test_a_wrong_argument_starts_nothing(cli, argument, words):
     done = subprocess.run([*LAUNCH, argument], capture_output=True, text=True, timeout=LIMIT)
     assert done.returncode != 0
     assert words in done.stdout + done.stderr
+    assert "process started" not in done.stdout + done.stderr
+
+
+@pytest.mark.skipif(shutil.which("rviz2") is not None, reason="RViz is installed")
+def test_without_rviz_nothing_is_left_behind(cli):
+    done = subprocess.run([*LAUNCH, "rviz:=true"], capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode != 0
+    assert "'rviz2' not found" in done.stdout + done.stderr
     assert "process started" not in done.stdout + done.stderr
 
 
