@@ -33,8 +33,9 @@ from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import parse_json, read_text, require_writable, sole_use
+from slap_ros.files import parse_json, read_text, sole_use
 from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.policies.library_files import require_places
 from slap_ros.skills.skill_library import (
     AcquiredSkill,
     SkillLibrary,
@@ -126,7 +127,8 @@ def acquire(
 
     Raises:
         InvalidParameterError: The domain does not say what skills are acquired with, torch is not
-            installed, or something cannot be what it is to be.
+            installed, something cannot be what it is to be, or the folder has something that is
+            no library.
         ProposalRejectedError: No operators passed the checks.
         BusyError: Another process trains in the same folder.
     """
@@ -189,8 +191,7 @@ def carry_out(
     known = known_skills(request.begin_with, watch.tell)
     there = _library_to_keep(request.keep, request.domain)
     shortcuts = request.shortcuts_over_kept()
-    for folder in (request.library_folder, request.work_folder):
-        require_writable(folder)
+    require_places(request.library_folder, request.work_folder)
     require_torch()
     with sole_use(request.work_folder):
         proposed = _proposed(request, watch)

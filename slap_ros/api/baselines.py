@@ -17,13 +17,19 @@ from slap_ros.api.training import training_folder
 from slap_ros.baselines.imported_policy import ImportedPolicy
 from slap_ros.baselines.method import BaselineProgress, Method, MethodSettings, Report
 from slap_ros.baselines.methods import METHODS
-from slap_ros.baselines.trained_baseline import TrainedBaseline, load_baseline, save_baseline
+from slap_ros.baselines.trained_baseline import (
+    BASELINE,
+    TrainedBaseline,
+    load_baseline,
+    save_baseline,
+)
 from slap_ros.core import Domain, task_with_goal
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.experiment import Experiment, Trial
-from slap_ros.files import require_writable, sole_use
+from slap_ros.files import sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.policies.library_files import require_places
 from slap_ros.skills.domain_choice import DomainChoice
 
 if TYPE_CHECKING:
@@ -63,12 +69,12 @@ def train_baseline(
         The baseline.
 
     Raises:
-        InvalidParameterError: There is no such method, setting or goal, or torch is not installed.
+        InvalidParameterError: There is no such method, setting or goal, torch is not installed, or
+            the folder has something that is no baseline.
         BusyError: Another process trains in the same folder.
     """
     kept_in = training_folder(folder, work)
-    for place in (Path(folder), kept_in):
-        require_writable(place)
+    require_places(Path(folder), kept_in, BASELINE)
     task_with_goal(domain, 0, 0, goal)
     kind = open_method(method)
     chosen = chosen_settings(kind, settings, changes, steps)

@@ -16,10 +16,11 @@ from slap_ros.api.library_descriptions import describe_skills
 from slap_ros.api.setting_texts import Changes, change_texts
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
-from slap_ros.files import require_writable, sole_use
+from slap_ros.files import sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
+from slap_ros.policies.library_files import require_places
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.shipped import require_same_skills
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -87,7 +88,8 @@ def train(
 
     Raises:
         NoSkillsError: The domain has no skills to begin with.
-        InvalidParameterError: Torch is not installed, or a setting cannot be what it is to be.
+        InvalidParameterError: Torch is not installed, a setting cannot be what it is to be, or the
+            folder has something that is no library.
         InvalidLibraryError, SkillsChangedError: The library to keep is damaged, another domain's,
             or was learned over other skills.
         BusyError: Another process trains in the same folder.
@@ -97,8 +99,7 @@ def train(
     chosen = chosen_settings(domain, settings, changes, steps)
     kept = () if keep is None else _shortcuts_to_keep(Path(keep), domain)
     work_folder = training_folder(folder, work)
-    for place in (Path(folder), work_folder):
-        require_writable(place)
+    require_places(Path(folder), work_folder)
     require_torch()
     choice, watched = DomainChoice.opened_as(domain), callback or Unwatched()
     tasks = TaskDistribution(choice, seed)

@@ -21,8 +21,8 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from slap_ros.errors import InvalidLibraryError
-from slap_ros.files import exchange, parse_json, read_bytes, read_text
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.files import exchange, parse_json, read_bytes, read_text, require_writable
 from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 
@@ -76,6 +76,39 @@ def _exchange(draft: Path, path: Path) -> None:
             if old.exists() and not path.exists():
                 old.rename(path)
             shutil.rmtree(old, ignore_errors=True)
+
+
+def require_replaceable(path: Path, about: str = ABOUT) -> None:
+    """Refuse a place where a library would replace something else, before it is made.
+
+    Args:
+        path: Path of the folder that the library is to have.
+        about: Name of the file that every such library has.
+
+    Raises:
+        InvalidParameterError: There is a file, or a folder with something that is no library.
+    """
+    if path.is_file() or (path.is_dir() and any(path.iterdir()) and not (path / about).is_file()):
+        raise InvalidParameterError(
+            f"{path} is no library, and would be replaced by one; give a new or an empty folder"
+        )
+
+
+def require_places(library: Path, work: Path, about: str = ABOUT) -> None:
+    """Check the places of a library and of the training that makes it, before it begins.
+
+    Args:
+        library: Path of the folder that the library is to have.
+        work: Path of the folder for checkpoints.
+        about: Name of the file that every such library has.
+
+    Raises:
+        InvalidParameterError: The library would replace something else.
+        OSError: Nothing can be written in one of them.
+    """
+    for place in (library, work):
+        require_writable(place)
+    require_replaceable(library, about)
 
 
 def write_library(

@@ -75,6 +75,27 @@ def test_a_proposal_is_that_of_the_command():
     assert json.loads(json.dumps(proposal.to_data())) == json.loads(told)["proposal"]
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("train", "obstacle2d"),
+        ("acquire", "stack_at_target"),
+        ("acquire-sequence", "bowls"),
+        ("baseline", "train", "ppo", "obstacle2d"),
+    ],
+)
+def test_nothing_but_a_library_is_replaced_by_one(command, tmp_path):
+    """Neither a file, nor a folder with somebody's files; it is seen before anything is learned."""
+    mine = tmp_path / "thesis" / "thesis.tex"
+    mine.parent.mkdir()
+    mine.write_text("years of work", encoding="utf-8")
+    for place in (mine, mine.parent):
+        ran = CliRunner().invoke(app, [*command, "--output", str(place)])
+        assert ran.exit_code == InvalidParameterError.code
+        assert "is no library" in " ".join(ran.stderr.split())
+    assert mine.read_text(encoding="utf-8") == "years of work"
+
+
 def test_proposers_that_do_not_fit_are_refused():
     bench = slap_ros.make("stow_hammer")
     with pytest.raises(InvalidParameterError, match="oracle"):
