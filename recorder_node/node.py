@@ -52,6 +52,7 @@ from ensemble.offered_qos import subscribe_as_offered
 from ensemble.parameters import parameter, read_parameters
 from slap_ros.bags.writer import BagWriter, require_new
 from slap_ros.errors import InvalidParameterError
+from slap_ros.files import require_writable
 from slap_ros.versions import versions
 
 # Looks for a message in vain, after which nothing more is expected; one every POLL_PERIOD, 0.2 s in
@@ -211,6 +212,10 @@ def _new_folder(name: str) -> Path:
         raise InvalidParameterError("parameter bag must name the folder to write")
     path = Path(name)
     require_new(path)
+    try:
+        require_writable(path)
+    except OSError as error:
+        raise InvalidParameterError(f"parameter bag: {path}: {error.strerror}") from error
     return path
 
 

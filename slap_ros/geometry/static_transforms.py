@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From the frame in which something is seen to the robot's base: chains of static transforms."""
+"""From the frame in which something is seen to the robot's base: chains of static transforms.
+
+The base may hang from another frame itself: many robots have one of the room, ``world``.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +30,21 @@ class StaticTransforms:
 
     def in_base(self, frame: str) -> Pose | None:
         """The pose of a frame in the base's; None where no chain leads there."""
-        pose, visited = IDENTITY, {frame}
-        while frame != self._base:
-            if frame not in self._parents:
-                return None
-            frame, step = self._parents[frame]
-            if frame in visited:
-                return None  # a loop
-            visited.add(frame)
-            pose = step.compose(pose)
-        return pose
+        seen, base = self._in_ancestors(frame), self._in_ancestors(self._base)
+        common = next((name for name in seen if name in base), None)
+        if common is None:
+            return None
+        return (
+            seen[common] if common == self._base else base[common].inverse().compose(seen[common])
+        )
+
+    def _in_ancestors(self, frame: str) -> dict[str, Pose]:
+        """The pose of a frame in itself and in each frame that it hangs from, the nearest first."""
+        found, at = {frame: IDENTITY}, frame
+        while at in self._parents:
+            parent, step = self._parents[at]
+            if parent in found:
+                break  # a loop
+            found[parent] = step.compose(found[at])
+            at = parent
+        return found

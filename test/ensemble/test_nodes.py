@@ -28,6 +28,7 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from ensemble.state_synchronizer import StateSynchronizer
 from slap_ros.bags import evaluate_bag
+from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.interfaces import PLAN_EVENT, STATE
 from slap_ros.skills.domain_choice import DomainChoice
@@ -135,6 +136,50 @@ def test_a_node_stops_cleanly(network, tmp_path, name, stop):
         out, err = process.communicate(timeout=LIMIT)
     assert process.returncode == 0, err
     assert "Traceback" not in out + err
+
+
+WORKING = """
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+def main():
+    workers = ThreadPoolExecutor(1)
+    workers.submit(time.sleep, 600.0)  # s
+    workers.shutdown(wait=False)
+    return 7
+"""
+MISSING = """
+from slap_ros.errors import InvalidParameterError
+
+raise InvalidParameterError("it is not installed")
+"""
+
+
+@pytest.mark.parametrize(
+    ("code", "returned", "said"), [(WORKING, 7, ""), (MISSING, 15, "busy: it is not installed\n")]
+)
+def test_a_node_ends_though_it_works_and_says_what_it_cannot_begin_for(
+    tmp_path, code, returned, said
+):
+    (tmp_path / "busy").mkdir()
+    (tmp_path / "busy" / "node.py").write_text(code)
+    run = "import sys; from ensemble.startup import main_of; sys.exit(main_of('busy'))"
+    ran = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path.append({str(tmp_path)!r}); {run}"],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert (ran.returncode, ran.stderr) == (returned, said)
+
+
+def test_a_recorder_that_cannot_write_says_so_before_anything_is_recorded(network, tmp_path):
+    (tmp_path / "file").touch()
+    with started("recorder_node", "-p", f"bag:={tmp_path / 'file' / 'bag'}") as process:
+        _, err = process.communicate(timeout=LIMIT)
+    assert process.returncode == ErrorCode.INVALID_PARAMETER
+    assert f"parameter bag: {tmp_path / 'file' / 'bag'}: Not a directory" in err
+    assert "Traceback" not in err
 
 
 INTERRUPTED_DESTRUCTOR = """

@@ -21,6 +21,7 @@ from ensemble.robot_parameters import (
     RobotBridgeParameters,
 )
 from planner_node.node import PlannerParameters
+from recorder_node.node import RecorderParameters
 from sim_node.node import SimParameters
 from skill_server.node import SkillServerParameters
 from slap_ros.skills.domain_choice import DomainChoice
@@ -38,6 +39,7 @@ KINDS = {
     "skill_server": (SkillServerParameters, CommonParameters),
     "planner_node": (PlannerParameters, CommonParameters),
     "acquisition_node": (AcquisitionParameters, CommonParameters),
+    "recorder_node": (RecorderParameters,),
 }
 CHOSEN = DomainChoice("obstacle_tower", "fair")
 

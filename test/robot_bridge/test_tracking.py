@@ -139,6 +139,11 @@ def test_cameras_hang_from_the_base_by_static_frames():
     frames.add("post", "camera", Pose((0.0, 0.0, 1.0), (0.0, half, 0.0, half)))
     assert frames.in_base("camera").apply((0.0, 0.0, 0.5)) == pytest.approx((1.5, 0.0, 1.0))
     assert frames.in_base("moon") is None
+    frames.add("world", "fr3_link0", Pose((0.0, 2.0, 0.0), (0.0, 0.0, half, half)))
+    assert frames.in_base("world").apply((0.0, 2.0, 0.5)) == pytest.approx((0.0, 0.0, 0.5))
+    frames.add("world", "ceiling", Pose((0.0, 3.0, 2.0)))
+    assert frames.in_base("ceiling").apply((0.0, 0.0, 0.0)) == pytest.approx((1.0, 0.0, 2.0))
+    assert frames.in_base("camera").apply((0.0, 0.0, 0.5)) == pytest.approx((1.5, 0.0, 1.0))
     frames.add("egg", "hen", Pose())
     frames.add("hen", "egg", Pose())
     assert frames.in_base("egg") is None
