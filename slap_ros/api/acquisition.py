@@ -35,7 +35,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, sole_use
 from slap_ros.learning.work_folder import WorkFolder
-from slap_ros.policies.library_files import require_places
+from slap_ros.policies.library_files import SKILL, require_places
 from slap_ros.skills.skill_library import (
     AcquiredSkill,
     SkillLibrary,
@@ -191,7 +191,7 @@ def carry_out(
     known = known_skills(request.begin_with, watch.tell)
     there = _library_to_keep(request.keep, request.domain)
     shortcuts = request.shortcuts_over_kept()
-    require_places(request.library_folder, request.work_folder)
+    require_places(request.library_folder, request.work_folder, SKILL)
     require_torch()
     with sole_use(request.work_folder):
         proposed = _proposed(request, watch)

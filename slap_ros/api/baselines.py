@@ -74,7 +74,7 @@ def train_baseline(
         BusyError: Another process trains in the same folder.
     """
     kept_in = training_folder(folder, work)
-    require_places(Path(folder), kept_in, BASELINE)
+    require_places(Path(folder), kept_in, "", BASELINE)
     task_with_goal(domain, 0, 0, goal)
     kind = open_method(method)
     chosen = chosen_settings(kind, settings, changes, steps)

@@ -20,7 +20,7 @@ from slap_ros.files import sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
-from slap_ros.policies.library_files import require_places
+from slap_ros.policies.library_files import SHORTCUT, require_places
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.shipped import require_same_skills
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -99,7 +99,7 @@ def train(
     chosen = chosen_settings(domain, settings, changes, steps)
     kept = () if keep is None else _shortcuts_to_keep(Path(keep), domain)
     work_folder = training_folder(folder, work)
-    require_places(Path(folder), work_folder)
+    require_places(Path(folder), work_folder, SHORTCUT)
     require_torch()
     choice, watched = DomainChoice.opened_as(domain), callback or Unwatched()
     tasks = TaskDistribution(choice, seed)

@@ -78,37 +78,49 @@ def _exchange(draft: Path, path: Path) -> None:
             shutil.rmtree(old, ignore_errors=True)
 
 
-def require_replaceable(path: Path, about: str = ABOUT) -> None:
+def require_replaceable(path: Path, member: str, about: str = ABOUT) -> None:
     """Refuse a place where a library would replace something else, before it is made.
 
     Args:
         path: Path of the folder that the library is to have.
+        member: Kind of the library's members: :data:`SKILL` or :data:`SHORTCUT`; empty for none.
         about: Name of the file that every such library has.
 
     Raises:
-        InvalidParameterError: There is a file, or a folder with something that is no library.
+        InvalidParameterError: There is a file, or a folder with something that is no such library.
     """
     if path.is_file() or (path.is_dir() and any(path.iterdir()) and not (path / about).is_file()):
         raise InvalidParameterError(
             f"{path} is no library, and would be replaced by one; give a new or an empty folder"
         )
+    if others := [kind for kind in KINDS if kind != member and any(path.glob(f"*/{kind}"))]:
+        raise InvalidParameterError(
+            f"{path} is a library of {KINDS[others[0]]}, and would be replaced by one of "
+            f"{KINDS.get(member, 'another kind')}; give another folder"
+        )
 
 
-def require_places(library: Path, work: Path, about: str = ABOUT) -> None:
+def require_places(library: Path, work: Path, member: str, about: str = ABOUT) -> None:
     """Check the places of a library and of the training that makes it, before it begins.
 
     Args:
         library: Path of the folder that the library is to have.
         work: Path of the folder for checkpoints.
+        member: As :func:`require_replaceable`.
         about: Name of the file that every such library has.
 
     Raises:
-        InvalidParameterError: The library would replace something else.
+        InvalidParameterError: The library would replace something else, or the checkpoints.
         OSError: Nothing can be written in one of them.
     """
     for place in (library, work):
         require_writable(place)
-    require_replaceable(library, about)
+    require_replaceable(library, member, about)
+    if library.resolve() in (work.resolve(), *work.resolve().parents):
+        raise InvalidParameterError(
+            f"checkpoints in {work} would be lost when the library in {library} is saved; give "
+            "folders of which none is in the other"
+        )
 
 
 def write_library(

@@ -96,6 +96,31 @@ def test_nothing_but_a_library_is_replaced_by_one(command, tmp_path):
     assert mine.read_text(encoding="utf-8") == "years of work"
 
 
+@pytest.mark.parametrize(
+    ("command", "kind"),
+    [
+        (("train", "obstacle2d"), "skills"),
+        (("acquire", "stack_at_target"), "shortcuts"),
+        (("baseline", "train", "ppo", "obstacle2d"), ""),
+    ],
+)
+def test_a_library_replaces_none_of_another_kind_and_no_checkpoints(command, kind, tmp_path):
+    member = tmp_path / "library" / "one" / f"{kind[:-1] or 'skill'}.json"
+    member.parent.mkdir(parents=True)
+    for path in (member, tmp_path / "library" / "library.json"):
+        path.write_text("{}", encoding="utf-8")
+    ran = CliRunner().invoke(app, [*command, "--output", str(tmp_path / "library")])
+    assert ran.exit_code == InvalidParameterError.code
+    assert (f"a library of {kind}" if kind else "is no library") in " ".join(ran.stderr.split())
+    assert member.read_text() == "{}"
+    new = tmp_path / "new"
+    for work in (new, new / "work"):
+        ran = CliRunner().invoke(app, [*command, "--output", str(new), "--work", str(work)])
+        assert ran.exit_code == InvalidParameterError.code
+        assert "would be lost when the library" in " ".join(ran.stderr.split())
+    assert not new.exists()
+
+
 def test_proposers_that_do_not_fit_are_refused():
     bench = slap_ros.make("stow_hammer")
     with pytest.raises(InvalidParameterError, match="oracle"):
