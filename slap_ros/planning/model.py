@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 from slap_ros.core import ActionSpace, Domain, GradualSkill, World
-from slap_ros.errors import ErrorCode, SkillNotApplicableError
+from slap_ros.errors import ErrorCode, InvalidStateError, SkillNotApplicableError
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State, Target
 
@@ -63,6 +63,7 @@ class Model:
         self._actions = actions
         self._cache: dict[Key, Rollout] = {}
         self._begun: dict[Key, None] = {}  # roll-outs of which a part was made
+        self._ends: dict[bytes, None] = {}  # keys of the states in which roll-outs ended
 
     @classmethod
     def of(cls, domain: Domain, initial: State) -> Self:
@@ -108,8 +109,7 @@ class Model:
     def _begin(self, key: Key) -> None:
         self.executed += 1
         self._begun[key] = None
-        if len(self._begun) > MOST_KEPT:
-            del self._begun[next(iter(self._begun))]  # the oldest
+        _forget_oldest(self._begun)
 
     def roll_out(self, option: Option, state: State, target: Target) -> Rollout:
         """Execute an option until it reaches its target or ends otherwise.
@@ -120,7 +120,12 @@ class Model:
             target: Where it shall end.
 
         Returns:
-            The outcome; not reached in no steps where the skill cannot start in the state.
+            The outcome; not reached in no steps where the skill cannot start in the state, or the
+            world refuses a state in which another roll-out ended: a hand that presses may end
+            where nothing can begin.
+
+        Raises:
+            InvalidStateError: The world refuses the state, which no roll-out has led to.
         """
         key = (option, target, state.key)
         if key not in self._cache:
@@ -128,12 +133,14 @@ class Model:
                 self._begin(key)
             del self._begun[key]
             self._cache[key] = self._simulate(option, state, target)
-            if len(self._cache) > MOST_KEPT:
-                del self._cache[next(iter(self._cache))]  # the oldest
+            self._ends[self._cache[key].final.key] = None
+            _forget_oldest(self._cache)
+            _forget_oldest(self._ends)
         return self._cache[key]
 
     def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
-        self._world.reset(state)
+        if (refusal := self._reset_to(state)) is not None:
+            return Rollout(False, 0, state, self.space.abstract(state), refusal)
         is_behind = False  # the world, where steps were foreseen
         try:
             execution = OptionExecution(option, target, self.space, self._actions, state)
@@ -153,6 +160,20 @@ class Model:
                 self._world.reset(state)
             state, is_behind = self._world.step(action), False
 
+    def _reset_to(self, state: State) -> OptionResult | None:
+        """Let the world begin in a state; why it refuses one in which another roll-out ended.
+
+        Raises:
+            InvalidStateError: It refuses any other state.
+        """
+        try:
+            self._world.reset(state)
+        except InvalidStateError as error:
+            if state.key not in self._ends:
+                raise
+            return OptionResult(error.code, str(error))
+        return None
+
 
 class CountedModel(Model):
     """A model for one plan: it counts from 0, and roll-outs known from earlier plans count as well.
@@ -171,3 +192,9 @@ class CountedModel(Model):
 
     def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
         return self._model.roll_out(option, state, target)
+
+
+def _forget_oldest(kept: dict[Any, Any]) -> None:
+    """Keep no more than :data:`MOST_KEPT` entries, after one was added."""
+    if len(kept) > MOST_KEPT:
+        del kept[next(iter(kept))]
