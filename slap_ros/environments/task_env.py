@@ -315,7 +315,10 @@ class TaskEnv(gymnasium.Env[Any, Any]):
                     yield index, task
                     break
             else:
-                raise InvalidStateError(f"{reason}; so have the {MOST_DRAWN} before it")
+                raise InvalidStateError(
+                    f"{reason}; so have the {MOST_DRAWN} before it: reset(seed=0, "
+                    'options={"index": 0}) begins in the first task'
+                )
 
     def _require_fit(self, task: Task) -> None:
         if reason := self._why_unfit(task):
