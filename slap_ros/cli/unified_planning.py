@@ -31,7 +31,8 @@ def plan_with_engine(domain: str, problem: str, engine: str) -> SymbolicPlan:
         engine: Name of the engine, such as ``aries``.
 
     Raises:
-        InvalidParameterError: unified-planning or the engine is missing, or cannot read the files.
+        InvalidParameterError: unified-planning or the engine is missing, or cannot read the files,
+            or the plan is no sequence.
         UnsolvableError: The engine says that there is no plan.
         PlanningLimitError: The engine ended without a plan.
     """
@@ -48,6 +49,11 @@ def plan_with_engine(domain: str, problem: str, engine: str) -> SymbolicPlan:
             failure = UnsolvableError if status.startswith("UNSOLVABLE") else PlanningLimitError
             reasons = "; ".join(entry.message for entry in result.log_messages or ())
             raise failure(f"unified-planning's {engine} found no plan: {status} {reasons}".rstrip())
+        if not hasattr(result.plan, "actions"):
+            raise InvalidParameterError(
+                f"unified-planning's {engine} found a plan that is no sequence of operators, as of "
+                "durative actions; that is not read here"
+            )
         steps = tuple(map(str, result.plan.actions))
         return SymbolicPlan(steps, _cost(task, result.plan), status == "SOLVED_OPTIMALLY")
 

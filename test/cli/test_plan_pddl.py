@@ -163,6 +163,19 @@ def test_an_engine_of_the_field_finds_plans_of_the_same_kind(tmp_path: Path, nam
         assert len(ours["plan"]) <= len(theirs["plan"])
 
 
+LAMP = """(define (domain lamp) (:requirements :durative-actions) (:predicates (lit))
+  (:durative-action light :parameters () :duration (= ?duration 2) :condition () :effect
+    (at end (lit))))"""
+LIT = "(define (problem lit) (:domain lamp) (:init) (:goal (lit)))"
+
+
+def test_a_plan_in_time_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("up_aries", reason="needs the extra 'up'")
+    result = invoke(tmp_path, (LAMP, LIT), "plan", "--planner", "up:aries")
+    assert result.exit_code == ErrorCode.INVALID_PARAMETER
+    assert "no sequence of operators, as of durative actions" in " ".join(result.stderr.split())
+
+
 def test_an_unknown_engine_is_named(tmp_path: Path) -> None:
     pytest.importorskip("unified_planning", reason="needs the extra 'up'")
     result = invoke(tmp_path, PAIRS["survey"], "plan", "--planner", "up:nobody")
