@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -117,7 +118,8 @@ def train(options: TrainOptions) -> int:
         print_json({"library": str(folder), **library.record, "seconds": seconds})
     console.print(
         f"{len(library.shortcuts)} shortcuts in {folder}, {seconds:.0f} s; see what they are worth "
-        f"with `slap evaluate {options.domain}{options.skills_given} --shortcuts {folder}`",
+        f"with `slap evaluate {options.domain}{options.skills_given} --shortcuts "
+        f"{shlex.quote(str(folder))}`",
     )
     return 0
 

@@ -56,6 +56,7 @@ class SolvedTasks:
     """What came of planning and executing tasks without shortcuts.
 
     Args:
+        domain: Name of their domain.
         seed: Seed of the tasks.
         episodes: Episodes that were executed, successful or not.
         failures: Reason why a task was not solved, by its index.
@@ -63,6 +64,7 @@ class SolvedTasks:
         planner: Name of the planner.
     """
 
+    domain: str
     seed: int
     episodes: tuple[EpisodeResult, ...]
     failures: dict[int, str]
@@ -83,7 +85,7 @@ class SolvedTasks:
             What came of each.
         """
         if not domain.operators:
-            return cls(seed, (), {}, 0, planner)
+            return cls(domain.name, seed, (), {}, 0, planner)
         episodes, failures = [], {}
         for index in range(count):
             try:
@@ -94,7 +96,7 @@ class SolvedTasks:
             episodes.append(episode)
             if not episode.success:
                 failures[index] = episode.error.reason
-        return cls(seed, tuple(episodes), failures, count, planner)
+        return cls(domain.name, seed, tuple(episodes), failures, count, planner)
 
     @property
     def _name(self) -> str:
@@ -120,6 +122,7 @@ class SolvedTasks:
             self._name,
             "problem" if solved == 0 else "warning",
             f"{solved} of {self.count} tasks solved; not so: {told}",
-            f"look at one: slap run DOMAIN --seed {self.seed} --index {min(self.failures)}"
+            f"look at one: slap run {self.domain} --seed {self.seed} --index "
+            f"{min(self.failures)}"
             f"{' --shortcuts none' if self.planner == 'lazy' else ''}",
         )
