@@ -134,6 +134,7 @@ class StateSynchronizer:
 
         Raises:
             SlapError: ``missing``, or why the task was refused, or its states cannot be perceived.
+            EpisodeChangedError: An earlier episode goes on meanwhile.
         """
         deadline = monotonic() + timeout_s
 
@@ -153,7 +154,9 @@ class StateSynchronizer:
             raise self._episodes.refusal
         if self.episode is None and self._unstarted is not None:
             raise decode_fault(self._unstarted)
-        if self.latest is None or not seen():
+        if self.latest is not None and not seen():
+            self.latest.require_episode(episode)
+        if self.latest is None:
             raise missing(
                 f"no perceived state{f' of episode {episode}' if episode else ''} within "
                 f"{timeout_s} s: are sim_node (or robot_bridge) and perception_node running? "

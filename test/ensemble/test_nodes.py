@@ -28,7 +28,7 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from ensemble.state_synchronizer import StateSynchronizer
 from slap_ros.bags import evaluate_bag
-from slap_ros.errors import ErrorCode
+from slap_ros.errors import EpisodeChangedError, ErrorCode, NoTaskError
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.interfaces import PLAN_EVENT, STATE
 from slap_ros.skills.domain_choice import DomainChoice
@@ -495,6 +495,10 @@ def test_states_of_an_episode_that_is_over_are_ignored(network):
         assert spinner.spin_until(lambda: synchronizer.latest.episode.number == 2, LIMIT)
         assert [o.episode.number for o in observations] == [1, 2]
         assert synchronizer.latest.step == 0
+        never = spinner.executor.create_task(synchronizer.observe(99, 0.2, NoTaskError))
+        assert spinner.spin_until(never.done, LIMIT)
+        with pytest.raises(EpisodeChangedError, match="goal for episode 99, but episode 2 is"):
+            never.result()
 
 
 def test_what_a_new_simulator_says_before_its_task_is_opened_is_kept(network):
