@@ -166,7 +166,7 @@ class SimulatedRobotParameters(WorldParameters):
 class MockRobotParameters(SimulatedRobotParameters):
     """What a mock robot is: see the docstring of ``robot_bridge.mock.node``."""
 
-    fault: str = parameter("", "reject, abort or ignore: what is done to a motion")
+    fault: str = parameter("", "reject, abort, ignore or stand: what is done to a motion")
     fault_after: int = parameter(0, "and after how many good ones")
 
 

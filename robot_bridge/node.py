@@ -89,6 +89,7 @@ from robot_bridge.step_measurement import StepMeasurement
 from slap_ros.core import Action, Task
 from slap_ros.errors import (
     BusyError,
+    ControllerAbortedError,
     InvalidStateError,
     NoDetectionError,
     NoJointStateError,
@@ -101,6 +102,7 @@ from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.robot_world import GripperAction
 
 POLL_PERIOD = 0.02  # s, between two looks at what is measured
+MOTIONLESS = 3  # motions in a row in which the arm stood, after which it is held to be stuck
 REPORT_PERIOD_S = 1.0  # between two reports of why there is no task yet
 
 
@@ -128,6 +130,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         self._goal: Collection[GroundAtom] = told.goal if told is not None else ()
         self._motion: Future | None = None  # the newest: done when its controllers have answered
         self._measurement: StepMeasurement  # of the step under way
+        self._stood = 0  # motions in a row in which the arm stood
         self._reported_s = -math.inf  # when it was last said why there is no task yet
         period_s = self._domain.execution.control_period_s
         self._horizon = Horizon(self._settings.horizon, self._settings.motion_limits, period_s)
@@ -212,6 +215,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
     async def _execute(self, gripper: GripperAction, points: tuple[TrajectoryPoint, ...]) -> None:
         try:
             await self._robot.actuate_gripper(gripper)
+            start = self._robot.world.joints
             if self._phase is Phase.MOVING:  # not failed meanwhile
                 await self._robot.controllers.follow(points)
         except SlapError as error:
@@ -221,7 +225,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             if self._phase is Phase.MOVING:
                 self._enter(Phase.LOOKING)
                 self._measurement = StepMeasurement(
-                    self._robot, self._settings, self._since_s, points[-1].positions
+                    self._robot, self._settings, self._since_s, start, points[-1].positions
                 )
 
     def _poll(self) -> None:
@@ -245,6 +249,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         state = self._measurement.poll(self._robot.clock.now_s())
         if state is None:
             return
+        self._require_motion()
         self._enter(Phase.READY)
         if not self._expected:
             self._publish_step(state)
@@ -252,6 +257,21 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             action, self._next = self._next, None
             with self._refusing():
                 self._apply(action)
+
+    def _require_motion(self) -> None:
+        """Refuse to go on with an arm that stands though its controller says that it has moved.
+
+        Raises:
+            ControllerAbortedError: It has stood several times in a row.
+        """
+        stood = self._measurement.stood
+        if stood is not None:
+            self._stood = self._stood + 1 if stood else 0
+        if self._stood == MOTIONLESS:
+            raise ControllerAbortedError(
+                f"the arm has stood through {MOTIONLESS} motions that its controller calls done: "
+                "are its brakes open, and does it execute what it accepts?"
+            )
 
     def _forget_commands(self) -> None:
         """Execute none of the commands that wait."""
@@ -323,6 +343,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
                 "it is seen, reset_task takes it in"
             )
         self._forget_commands()
+        self._stood = 0
         self._enter(Phase.READY)
         self._open_episode(Task(state, goal, self._domain.step_limit))
 

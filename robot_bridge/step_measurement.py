@@ -12,6 +12,9 @@ from slap_ros.errors import ControllerAbortedError, InvalidStateError
 from slap_ros.relational import State
 from slap_ros.robot.limits import Joints
 
+ASKED = 0.02  # rad, of a joint: a shorter motion does not tell whether the arm moves
+STOOD = 0.1  # share of a motion; an arm that has not gone so far has stood
+
 
 class MeasurementLimits(Protocol):
     """How long a measurement may take, and how far off the arm may be."""
@@ -29,12 +32,14 @@ class StepMeasurement:
         robot: What is measured.
         limits: How long it may take.
         since_s: When the arm came to rest; s, of the robot's clock.
+        start: Where it was before the motion, rad.
         target: Where the controller says that the arm went, rad.
     """
 
     robot: Robot
     limits: MeasurementLimits
     since_s: float
+    start: Joints
     target: Joints
 
     def poll(self, now_s: float) -> State | None:
@@ -59,6 +64,14 @@ class StepMeasurement:
         elif late:
             raise self.robot.no_detection(self.since_s, f"within {self.limits.detection_timeout} s")
         return state
+
+    @property
+    def stood(self) -> bool | None:
+        """Whether the arm has stood, as measured now; None where it was hardly told to move."""
+        asked = max(abs(b - a) for a, b in zip(self.start, self.target, strict=True))
+        return (
+            self.robot.world.joint_distance(self.start) < STOOD * asked if asked > ASKED else None
+        )
 
     def _require_arrival(self) -> None:
         off = self.robot.world.joint_distance(self.target)

@@ -85,6 +85,8 @@ class MockControllers:
             await pause(self._node, self._noise.delay_s())
             if self._fails("abort"):
                 return self._abort(goal)
+            if self._fails("stand"):
+                return self._arrive(goal)
             return await self._follow(goal)
         finally:
             self.busy = False
@@ -106,6 +108,9 @@ class MockControllers:
                 goal.canceled()
                 return FollowJointTrajectory.Result()
             began_s = point.time_s
+        return self._arrive(goal)
+
+    def _arrive(self, goal: ServerGoalHandle) -> FollowJointTrajectory.Result:
         self._counts["motions"] += 1
         goal.succeed()
         return FollowJointTrajectory.Result()

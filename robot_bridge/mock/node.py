@@ -21,7 +21,7 @@ ROS Parameters:
     hidden (string, ""): an object that is never detected.
     pace (double, 1.0): how many times faster than a real one it moves.
     noise_seed (int, 0): noise and delays are a function of it.
-    fault (string, ""): reject, abort or ignore: what the arm's controller does to a motion,
+    fault (string, ""): reject, abort, ignore or stand: what the arm's controller does to a motion,
     fault_after (int, 0): and after how many good ones.
 
 Publishers:
@@ -53,7 +53,7 @@ from robot_bridge.simulated.sensors import DetectionPublisher, JointStatePublish
 from slap_ros.errors import InvalidParameterError
 from slap_ros.skills.domain_choice import open_domain
 
-FAULTS = ("", "reject", "abort", "ignore")
+FAULTS = ("", "reject", "abort", "ignore", "stand")  # stand: it says that the arm has arrived
 
 
 class MockRobot(Node):

@@ -25,6 +25,7 @@ from slap_ros.errors import (
     InvalidParameterError,
     InvalidStateError,
     NoDetectionError,
+    NoJointStateError,
     OpenLoopOnlyError,
     UnsafeCommandError,
 )
@@ -41,7 +42,7 @@ from slap_ros.robot.grasp_tracking import (
 from slap_ros.robot.hidden_objects import PredictedMotion, pushed_aside
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.known_scene import KnownScene
-from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
+from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Joints, Limits
 from slap_ros.robot.line_of_sight import Ways, is_slanted
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.state_assembly import Grasp, feature_values
@@ -193,6 +194,17 @@ class RobotWorld:
     def newest_joints_s(self) -> float:
         """Stamp of the newest joint positions; minus infinity without any."""
         return -math.inf if self._reading is None else self._reading.stamp_s
+
+    @property
+    def joints(self) -> Joints:
+        """The newest joint positions, rad.
+
+        Raises:
+            NoJointStateError: There were none yet.
+        """
+        if self._reading is None:
+            raise NoJointStateError("no joint positions yet")
+        return self._reading.joints
 
     def joint_distance(self, joints: Sequence[float]) -> float:
         """How far the joint that is furthest off is from where it should be, rad."""

@@ -233,6 +233,16 @@ def test_a_controller_that_fails_leaves_the_robot_holding(network, fault, code):
         bench.fault(code)
 
 
+def test_an_arm_that_stands_though_its_controller_says_otherwise_is_noticed(network):
+    with lab(EXACT | {"fault": "stand", "fault_after": 1}) as bench:
+        for _ in range(3):  # the first one moves it
+            bench.step(deltas=[0.05, *STILL[1:]])
+        bench.step()  # nothing is asked for, so that nothing is told
+        bench.command(deltas=[0.05, *STILL[1:]])
+        bench.fault(ErrorCode.CONTROLLER_ABORTED)
+        assert "stood through 3 motions" in bench.faults[0].error_msg
+
+
 def test_a_horizon_of_commands_is_one_motion_that_begins_with_the_last(network):
     with lab(EXACT, bridge={"horizon": 3, "hold_after": 60.0}) as bench:
         bench.until(lambda: bench.joints)
