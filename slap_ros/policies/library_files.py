@@ -106,7 +106,7 @@ def require_places(library: Path, work: Path, member: str, about: str = ABOUT) -
     Args:
         library: Path of the folder that the library is to have.
         work: Path of the folder for checkpoints.
-        member: As :func:`require_replaceable`.
+        member: Kind of the library's members: :data:`SKILL` or :data:`SHORTCUT`; empty for none.
         about: Name of the file that every such library has.
 
     Raises:
