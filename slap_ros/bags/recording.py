@@ -111,7 +111,8 @@ class Recording:
 
     def _add_task(self, msg: TaskMessage) -> None:
         episode = self._episode(msg.episode)
-        episode.task = episode.task or msg  # as of states, the first counts
+        if episode.task is None or not episode.states:  # else it is another simulator's
+            episode.task = msg
 
     def _add_state(self, msg: StateMessage) -> None:
         if not all(isfinite(value) for obj in msg.objects for value in obj.features):

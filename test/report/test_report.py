@@ -155,7 +155,8 @@ def test_a_clock_that_was_set_shows_the_same(script: Script, bags: Bags, tmp_pat
 def test_the_robot_is_what_its_domain_calls_one(script: Script) -> None:
     renamed = copy.deepcopy(script.messages)
     for item in renamed:
-        for part in (*getattr(item.message, "types", ()), *getattr(item.message, "objects", ())):
+        state = getattr(item.message, "initial_state", item.message)
+        for part in (*getattr(item.message, "types", ()), *getattr(state, "objects", ())):
             for name in ("name", "type"):
                 if getattr(part, name, "") == "robot":
                     setattr(part, name, "gantry")
