@@ -88,6 +88,7 @@ from robot_bridge.robot import Robot
 from robot_bridge.step_measurement import StepMeasurement
 from slap_ros.core import Action, Task
 from slap_ros.errors import (
+    AlreadyRunningError,
     BusyError,
     ControllerAbortedError,
     InvalidStateError,
@@ -102,6 +103,8 @@ from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.robot_world import GripperAction
 
 POLL_PERIOD = 0.02  # s, between two looks at what is measured
+# What keeps a task from being begun, as long as it lasts.
+UNSTARTED = (AlreadyRunningError, InvalidStateError, NoDetectionError, NoJointStateError)
 MOTIONLESS = 3  # motions in a row in which the arm stood, after which it is held to be stuck
 REPORT_PERIOD_S = 1.0  # between two reports of why there is no task yet
 
@@ -293,15 +296,29 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         try:
             state = self._robot.world.measure_first(self._since_s)
             if state is not None:
+                self._require_alone()
                 self._begin(state)
             elif self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout:
                 raise self._unmeasured
-        except (InvalidStateError, NoDetectionError, NoJointStateError) as error:
+        except UNSTARTED as error:
             now_s = self._robot.clock.now_s()
             if now_s - self._reported_s >= REPORT_PERIOD_S:
                 self._reported_s = now_s
                 self.get_logger().warning(f"not yet: {error}")
                 self._publish_fault(error)
+
+    def _require_alone(self) -> None:
+        """Refuse to begin beside another bridge: both would command the arm.
+
+        Raises:
+            AlreadyRunningError: There is one, or one was killed a moment ago.
+        """
+        own = (self.get_name(), self.get_namespace())
+        if self.get_node_names_and_namespaces().count(own) > 1:
+            raise AlreadyRunningError(
+                f"another {self.get_name()} runs in {self.get_namespace()}, and one of them only "
+                "may command the arm: stop the other one"
+            )
 
     def _reset(self, request: ResetTask.Request) -> None:
         if request.initial_state.objects:

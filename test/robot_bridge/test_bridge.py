@@ -23,7 +23,7 @@ from tf2_msgs.msg import TFMessage
 from ensemble.cli.run_options import RunOptions
 from ensemble.client import RunClient
 from ensemble.interfaces import COMMAND, FAULT, JOINT_STATES, RESET_TASK, SENSOR_DATA, TF
-from ensemble.launcher import InProcessLauncher
+from ensemble.launcher import InProcessLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest, run
@@ -231,6 +231,16 @@ def test_a_controller_that_fails_leaves_the_robot_holding(network, fault, code):
             bench.step(deltas=[0.05, *STILL[1:]])
         bench.command(deltas=[0.05, *STILL[1:]])
         bench.fault(code)
+
+
+@pytest.mark.slow  # a node in a process of its own
+def test_a_second_bridge_does_not_begin_beside_the_first(network):
+    nodes = node_parameters(settings(None, PATIENT))
+    with lab() as bench, ProcessLauncher({"robot_bridge": nodes["robot_bridge"]}):
+        bench.until(lambda: bench.faults)
+        assert bench.faults[0].error_code == ErrorCode.ALREADY_RUNNING
+        bench.step(deltas=[0.05, *STILL[1:]])
+        assert [(state.episode, state.step) for state in bench.states] == [(1, 0), (1, 1)]
 
 
 def test_an_arm_that_stands_though_its_controller_says_otherwise_is_noticed(network):
