@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from slap_ros.core import Domain, Task
-from slap_ros.errors import UnsolvableError
+from slap_ros.errors import InvalidStateError, UnsolvableError
 from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.planning.abstract_graph import Edge
 from slap_ros.planning.plan import Plan
@@ -283,6 +283,8 @@ class Explorer:
         for origin in self._origins(vertices):
             if not self._affords_rollouts(origin.state):
                 break
+            if not self._accepts(origin.state):
+                continue
             for abstract, reached in self._roll_out(origin).items():
                 if len(reached.lengths) < self._settings.hits:
                     continue
@@ -291,7 +293,8 @@ class Explorer:
                     candidates += self._candidates(origin, target, reached)
         if self._settings.straightened:
             along = self._along_plan(vertices) if self._settings.along_plan else []
-            candidates += self._straightened([*vertices, *along], to_go)
+            possible = [vertex for vertex in (*vertices, *along) if self._accepts(vertex.state)]
+            candidates += self._straightened(possible, to_go)
         return ExplorationResult(
             tuple(candidate for candidate in candidates if candidate.expected_saving > 0.0),
             len(self.graph.candidates()),
@@ -530,6 +533,14 @@ class Explorer:
         if not rollout.reached:
             return None
         return Vertex(edge.target, rollout.final, vertex.g + rollout.steps, vertex, edge)
+
+    def _accepts(self, state: State) -> bool:
+        """Whether rollouts can begin in a state: skills may end where nothing can begin."""
+        try:
+            self._worlds.reset(0, state)
+        except InvalidStateError:
+            return False
+        return True
 
     def _roll_out(self, origin: RolloutOrigin) -> dict[int, _Reached]:
         """Rollouts, for all targets at once: those that reached each abstract state, a mask."""
