@@ -35,6 +35,7 @@ def check_domain(
     rng = np.random.default_rng([CHECK_SEED, seed])
     yield cost.import_time(domain)
     yield tasks.different(domain, CHECK_SEED + seed, task_count)
+    yield atoms.shapes(domain, CHECK_SEED + seed)
     if domain.acquisition is not None:
         yield from acquisition.parts(domain, domain.acquisition)
         yield acquisition.goals(domain, domain.acquisition, CHECK_SEED + seed)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether predicates and their margins agree, and how close initial states are to thresholds."""
+"""Whether predicates and their margins agree, have the right shape, and leave a tolerance."""
 
 from __future__ import annotations
 
@@ -12,6 +12,36 @@ from slap_ros.domain_check.experience import Experience
 from slap_ros.relational import Column, GroundAtom, State
 
 JITTER = 1e-9  # in the margin's unit: what rounding may change
+
+
+def shapes(domain: Domain, seed: int) -> Check:
+    """Whether predicates and margins judge each atom in each state of a batch by itself.
+
+    What has another shape may still fit by numpy's broadcasting, and be wrong.
+
+    Args:
+        domain: Domain to check.
+        seed: Seed of the task whose initial state is judged.
+    """
+    state = domain.task(seed).initial_state
+    batch = State(state.layout, np.stack([state.data, state.data]))
+    space = domain.atom_space(state)
+    for predicate in domain.predicates:
+        atoms = [atom.objects for atom in space.atoms if atom.predicate == predicate]
+        columns = [Column(objects) for objects in zip(*atoms, strict=True)]
+        for states in (state, batch) if atoms else ():
+            wanted = (*states.data.shape[:-1], len(atoms))
+            for what, judge in (("classifier", predicate.classifier), ("margin", predicate.margin)):
+                found = wanted if judge is None else np.shape(judge(states, *columns))
+                if found != wanted:
+                    return Check(
+                        "predicates",
+                        "problem",
+                        f"the {what} of {predicate.name} has the shape {found} for {len(atoms)} "
+                        f"atoms and states of shape {states.data.shape}, wanted {wanted}",
+                        "features of a Column have an axis of atoms after those of states",
+                    )
+    return Check("predicates", "ok", f"{len(domain.predicates)} judge each atom by itself")
 
 
 def margins(domain: Domain, experience: Experience) -> Check:

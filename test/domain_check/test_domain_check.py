@@ -76,6 +76,23 @@ def with_predicate(name, **changes):
     return replace(FLAT, predicates=predicates)
 
 
+@pytest.mark.parametrize(
+    ("broken", "shape"),
+    [
+        (lambda held: held[..., :1], r"\(1,\) for 2 atoms and states of shape \(\d+,\)"),
+        (lambda held: held.reshape(-1)[:2], r"\(2,\) for 2 atoms and states of shape \(2, \d+\)"),
+    ],
+)
+def test_a_predicate_of_another_shape_is_found_though_it_would_fit(broken, shape):
+    holding = next(p for p in FLAT.predicates if p.name == "Holding")
+    domain = with_predicate(
+        "Holding", classifier=lambda *given: broken(holding.classifier(*given)), margin=None
+    )
+    found = findings(domain, tasks=1)["predicates"]
+    assert found.status == "problem"
+    assert re.search(f"classifier of Holding has the shape {shape}", found.found)
+
+
 def test_a_margin_that_contradicts_its_predicate_is_found():
     on = next(p for p in FLAT.predicates if p.name == "On")
     found = findings(with_predicate("On", margin=lambda *a: -on.margin(*a) - 1e-4))["margins"]
