@@ -44,7 +44,7 @@ from slap_ros.core.goals import task_with_goal
 from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import run_in_order
-from slap_ros.policies.library_files import SKILL, require_replaceable
+from slap_ros.policies.library_files import SKILL, require_places
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.skills.skill import LearnedSkill
 from slap_ros.skills.skill_library import SkillLibrary, save_skill_library
@@ -78,10 +78,10 @@ def acquire_sequence(
 
     Raises:
         InvalidParameterError: The work folder has another sequence, or is damaged; or the library's
-            folder has something that is no library.
+            folder has something that is no library, or would have the work folder in it.
     """
     base = request.acquisition
-    require_replaceable(base.library_folder, SKILL)
+    require_places(base.library_folder, base.work_folder, SKILL)
     WorkFolder(base.work_folder).require_same(request.as_json())
     steps: list[SequenceStep] = []
     learner = _SequenceLearner(request, jobs, ray, watch)

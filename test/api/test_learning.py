@@ -101,6 +101,7 @@ def test_nothing_but_a_library_is_replaced_by_one(command, tmp_path):
     [
         (("train", "obstacle2d"), "skills"),
         (("acquire", "stack_at_target"), "shortcuts"),
+        (("acquire-sequence", "bowls"), "shortcuts"),
         (("baseline", "train", "ppo", "obstacle2d"), ""),
     ],
 )
