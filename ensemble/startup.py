@@ -20,10 +20,10 @@ PATIENCE_S = 1.0  # for threads that are told to end
 def main_of(package: str) -> int:
     """Import a node and run it. Ctrl-C ends the process without a word until the node takes over.
 
+    A thread that still works when the node has ended, as in the middle of a plan, ends with it.
+
     Args:
         package: Such as ``sim_node``.
-
-    A thread that still works when the node has ended, as in the middle of a plan, ends with it.
 
     Returns:
         The exit code of its ``main``, or of an error that keeps it from being imported.

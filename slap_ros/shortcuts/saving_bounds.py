@@ -13,10 +13,9 @@ import heapq
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from statistics import fmean
 
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
-from slap_ros.shortcuts.way_on import steps_to_goal
+from slap_ros.shortcuts.way_on import cost_of_edges, steps_to_goal
 
 Operators = tuple[str, ...]
 NO_WAY: tuple[float, Operators] = (math.inf, ())
@@ -50,8 +49,7 @@ def saving_bounds(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
     Returns:
         Bounds, the largest saving first.
     """
-    usual = fmean(operator_steps.values() or [1.0])
-    ways = _CheapestWays(graph, lambda edge: operator_steps.get(edge.option.skill.name, usual))
+    ways = _CheapestWays(graph, cost_of_edges(operator_steps))
     to_go, from_start = steps_to_goal(graph, operator_steps), ways.leading_from(0)
     bounds = []
     for i, j in graph.candidates():

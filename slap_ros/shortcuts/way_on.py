@@ -10,7 +10,7 @@ lie so that the next skill fails. So one way on is tried, the one that looks che
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -61,8 +61,9 @@ class WayOn:
             return NO_WAY
         to_go, forward = steps_to_goal(graph, operator_steps), graph.forward_edges()
         goals, at, total = set(graph.goal_nodes), 0, 0
+        cost = cost_of_edges(operator_steps)
         while at not in goals:
-            edge = min(forward[at], key=lambda e: _through(e, to_go, operator_steps), default=None)
+            edge = min(forward[at], key=lambda e: cost(e) + to_go[e.target], default=None)
             if edge is None or total + edge.option.skill.step_limit > budget:
                 return NO_WAY
             target = edge.option.target(graph.nodes[edge.target])
@@ -86,15 +87,14 @@ class WayOn:
         return self._graphs[node]
 
 
-def _through(edge: Edge, to_go: list[float], operator_steps: Mapping[str, float]) -> float:
-    """Estimated environment steps to a goal by an edge."""
-    return _steps_of(edge, operator_steps) + to_go[edge.target]
+def cost_of_edges(operator_steps: Mapping[str, float]) -> Callable[[Edge], float]:
+    """A function that gives an edge's mean environment steps; without any, the mean of others.
 
-
-def _steps_of(edge: Edge, operator_steps: Mapping[str, float]) -> float:
-    """Mean environment steps of an edge's operator; without one, the mean of the others."""
-    known = operator_steps.get(edge.option.skill.name)
-    return float(np.mean(list(operator_steps.values()) or [1.0])) if known is None else known
+    Args:
+        operator_steps: Mean environment steps of each operator, by name.
+    """
+    usual = float(np.mean(list(operator_steps.values()) or [1.0]))
+    return lambda edge: operator_steps.get(edge.option.skill.name, usual)
 
 
 def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> list[float]:
@@ -102,6 +102,7 @@ def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
 
     Operators count with their mean, and those without one with the mean of the others.
     """
+    cost = cost_of_edges(operator_steps)
     incoming: list[list[Edge]] = [[] for _ in graph.nodes]
     for edge in graph.edges:
         incoming[edge.target].append(edge)
@@ -114,7 +115,7 @@ def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
         if rest > to_go[node]:
             continue
         for edge in incoming[node]:
-            longer = rest + _steps_of(edge, operator_steps)
+            longer = rest + cost(edge)
             if longer < to_go[edge.source]:
                 to_go[edge.source] = longer
                 heapq.heappush(queue, (longer, edge.source))

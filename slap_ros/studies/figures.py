@@ -40,8 +40,8 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "figure.constrained_layout.wspace": 0.05,
 }
-# Okabe and Ito's, without yellow and black: apart from one another for the colour-blind as well.
 APART = 0.1  # between markers of neighbouring series, in the unit of their places
+# Okabe and Ito's, without yellow and black: apart from one another for the colour-blind as well.
 LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 
 
