@@ -8,12 +8,14 @@ import pytest
 pytest.importorskip("pybullet")
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.tabletop.skills import TrajectoryFollower
+from slap_ros.domains.tabletop.skills import AIM, AIM_STEPS, Aim, TrajectoryFollower
+from slap_ros.motion import shifted
 from slap_ros.worlds.features import JOINT_FEATURES
-from slap_ros.worlds.panda import HOME, MAX_STEP
+from slap_ros.worlds.panda import HOME, MAX_STEP, grasp_pose
 
 DOMAIN = get_domain("obstacle_tower", "fair")
 START = DOMAIN.task(0).initial_state
+(BLOCK,) = (obj for obj in START.objects if obj.name == "block1")
 (ROBOT,) = (obj for obj in START.objects if obj.type.name == "robot")
 WAY = [np.array(HOME) + k * np.array(MAX_STEP) for k in range(1, 6)]
 SCRIPT = [*((position, 0.0) for position in WAY), (WAY[-1], 1.0)]
@@ -52,3 +54,53 @@ def test_an_arm_that_lags_is_never_asked_for_more_than_it_may_do_and_still_arriv
 def test_an_arm_that_is_held_up_does_not_keep_a_skill_for_ever():
     _, actions = run(TrajectoryFollower(SCRIPT, MAX_STEP), 0.0)
     assert len(SCRIPT) < len(actions) <= 3 * len(SCRIPT)
+
+
+# Where a block is that the fingers are around at the end of the way.
+GRASPED = grasp_pose(WAY[-1]).position
+
+
+def beside(joints, block):
+    """The arm at joint positions, and the block with its middle somewhere."""
+    moved = {(BLOCK, axis): part for axis, part in zip("xyz", block, strict=True)}
+    return at(joints).replace(moved)
+
+
+def gripping(shake, block):
+    """Joint positions and block at each command to grip, where the arm shakes; commands in all."""
+    rng, joints, gripped = np.random.default_rng(0), np.array(HOME), []
+    aim = Aim.at(BLOCK, beside(HOME, GRASPED))
+    follow, count = TrajectoryFollower(SCRIPT, MAX_STEP, aim), 0
+    while (action := follow(beside(joints, block))) is not None:
+        DOMAIN.action_space.check(action)
+        if action[7] == 1.0:
+            gripped.append(joints)
+        joints, count = joints + action[:7] + shake * rng.standard_normal(7), count + 1
+    return gripped, count
+
+
+def distance(joints, block):
+    return np.linalg.norm(np.subtract(grasp_pose(joints).position, block))
+
+
+def test_fingers_on_an_arm_that_shakes_close_once_they_are_around_the_block():
+    ((joints,), count) = gripping(0.02, GRASPED)
+    assert distance(joints, GRASPED) <= AIM
+    assert count > len(SCRIPT)
+
+
+def test_fingers_close_around_a_block_that_was_pushed():
+    pushed = (GRASPED[0] + 0.02, GRASPED[1] - 0.01, GRASPED[2])
+    ((joints,), _) = gripping(0.0, pushed)
+    assert distance(joints, pushed) <= AIM < distance(WAY[-1], pushed)
+
+
+def test_fingers_close_at_once_where_they_are_around_the_block():
+    assert gripping(0.0, GRASPED)[1] == len(SCRIPT)
+
+
+def test_an_arm_that_never_gets_around_its_block_closes_its_fingers_in_the_end():
+    far = shifted(grasp_pose(WAY[-1]), (0.0, 0.0, -2.0)).position
+    gripped, count = gripping(0.0, far)
+    assert len(gripped) == 1
+    assert count == len(SCRIPT) + AIM_STEPS

@@ -13,10 +13,11 @@ import numpy as np
 
 from slap_ros.core import Action, Policy
 from slap_ros.domains.tabletop.memory import memoized
-from slap_ros.domains.tabletop.state_access import joints_of
+from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.domains.tabletop.timing import ROUNDING, Timing
 from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
+from slap_ros.geometry.pose import Pose
 from slap_ros.motion import Joints, linear_motion, shifted
 from slap_ros.portable_math import on_grid
 from slap_ros.relational import Object, State
@@ -26,10 +27,44 @@ STEP_LIMIT = 100  # environment steps
 GRIP, RELEASE = 1.0, -1.0  # gripper commands
 LAG = 0.005  # rad, by which an arm may be late without being waited for
 TRIES = 3  # for a position
+AIM = 0.009  # m, between the fingers' middle and that of what they close around
+AIM_STEPS = 40  # environment steps, at most, to bring the fingers there
 
 # The transits of a skill from a state, in the order in which they are tried.
 Transits = Callable[[State, tuple[Object, ...]], Iterable[Transit]]
 Trajectory = Sequence[tuple[Joints, float]]  # joint positions, rad, each with a gripper command
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What fingers are to close around, which may be moved while the arm comes near.
+
+    Args:
+        thing: What is to be grasped.
+        planned: Pose of it for which the motion was planned.
+    """
+
+    thing: Object
+    planned: Pose
+
+    @classmethod
+    def at(cls, thing: Object, state: State) -> Aim:
+        """At a thing where it is now."""
+        return cls(thing, pose_of(state, thing))
+
+    def corrected(self, grasp: Joints, state: State) -> Joints | None:
+        """Joint positions to go to before the fingers close; None where they are around it.
+
+        Args:
+            grasp: Joint positions of the planned grasp, rad, shape (7,).
+            state: State in which the fingers would close.
+        """
+        (x, y, z), (x0, y0, z0) = pose_of(state, self.thing).position, self.planned.position
+        wanted = shifted(grasp_pose(grasp), (x - x0, y - y0, z - z0))
+        if math.dist(grasp_pose(joints_of(state)).position, wanted.position) <= AIM:
+            return None
+        way = linear_motion(grasp, wanted)
+        return grasp if way is None else on_grid(way[-1])
 
 
 class TrajectoryFollower:
@@ -38,23 +73,37 @@ class TrajectoryFollower:
     Closed loop: each action is the difference from where the arm is. A real arm lags behind; where
     the difference is more than a step may be, the action is as far in that direction as it may be.
     If that leaves more than LAG, the same waypoint is tried again, a few times at most, as an arm
-    that is blocked never gets there.
+    that is blocked never gets there. Fingers close once they are around what is aimed at: an arm
+    that shakes, or has pushed it, would close them beside it.
     """
 
-    def __init__(self, trajectory: Trajectory, max_step: Sequence[float]) -> None:
-        """``trajectory``: see :data:`Trajectory`; ``max_step``: of each joint in a step, rad."""
+    def __init__(
+        self, trajectory: Trajectory, max_step: Sequence[float], aim: Aim | None = None
+    ) -> None:
+        """Begin with the first waypoint.
+
+        Args:
+            trajectory: See :data:`Trajectory`.
+            max_step: Largest displacement of each joint in a step, rad.
+            aim: What the fingers are to close around; None where they close wherever they are.
+        """
         # Motion planning rounds its last bit as the processor does. Contact amplifies that.
         self._trajectory = deque((on_grid(position), grip) for position, grip in trajectory)
         self._max_step = np.array(max_step)
         self._tries = TRIES
+        self._aim, self._aim_steps = aim, AIM_STEPS
 
     def __call__(self, state: State) -> Action | None:
         """The next action; None at the end of the trajectory."""
         if not self._trajectory:
             return None
         position, gripper = self._trajectory[0]
+        if gripper == GRIP and (better := self._corrected(position, state)) is not None:
+            self._aim_steps -= 1
+            missing = better - joints_of(state)
+            return np.array([*(missing / max(1.0, self._excess(missing))), 0.0])
         missing = position - joints_of(state)
-        excess = float((np.abs(missing) / self._max_step).max())
+        excess = self._excess(missing)
         if excess <= 1.0 + ROUNDING:
             self._next()
             return np.array([*missing, gripper])
@@ -64,6 +113,16 @@ class TrajectoryFollower:
         else:
             gripper = 0.0  # not yet
         return np.array([*(missing / excess), gripper])
+
+    def _corrected(self, grasp: Joints, state: State) -> Joints | None:
+        """Where the arm goes before the fingers close; None where they are to close now."""
+        if self._aim is None or self._aim_steps == 0:
+            return None
+        return self._aim.corrected(grasp, state)
+
+    def _excess(self, missing: Joints) -> float:
+        """A displacement in steps of the arm."""
+        return float((np.abs(missing) / self._max_step).max())
 
     def _next(self) -> None:
         self._trajectory.popleft()
@@ -81,7 +140,7 @@ class TransitSkill:
         name: Name of the operator.
         timing: Timing of the paths.
         transits: Function that gives the transits to try; see :data:`Transits`.
-        gripper: The gripper command at the goal.
+        gripper: The gripper command at the goal; it grips the second of the skill's objects.
         lift: Height to which the hand is lifted after the gripper command, m.
         step_limit: Environment steps after which the skill fails.
     """
@@ -112,9 +171,11 @@ class TransitSkill:
         """
         for transit in self.ways(state, objects):
             try:
-                return TrajectoryFollower(self._trajectory(transit), self.timing.max_step)
+                trajectory = self._trajectory(transit)
             except SkillNotApplicableError:
                 continue
+            aim = Aim.at(objects[1], state) if self.gripper == GRIP else None
+            return TrajectoryFollower(trajectory, self.timing.max_step, aim)
         raise _no_transit(self.name, objects)
 
     @property
