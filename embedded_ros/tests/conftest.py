@@ -85,10 +85,13 @@ class Process:
         return self._process.returncode, out, err
 
     def kill(self) -> None:
-        """Make sure it is gone."""
-        if self._process.poll() is None:
+        """Make sure it is gone; pytest shows what it wrote, and how it ended, where a test fails."""
+        code = self._process.poll()
+        if code is None:
             self._process.kill()
-        self._process.communicate()
+        out, err = self._process.communicate()
+        how = "still ran" if code is None else f"had ended with exit code {code}"
+        print(f"process {self.pid} {how}\n{out}{err}")
 
 
 @contextmanager
