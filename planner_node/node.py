@@ -38,6 +38,7 @@ Action clients:
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -160,8 +161,15 @@ class PlannerNode(Node):
     async def _prepare(self, goal: ServerGoalHandle, start: Observation) -> TaskExecution:
         episode, name = start.episode, self._settings.planner
         atoms = decode_goal(goal.request.goal, episode.space) or episode.task.goal
+
+        def is_canceled() -> bool:
+            latest = self._synchronizer.latest
+            return goal.is_cancel_requested or latest is None or latest.episode is not episode
+
         planner = PartialPlanner(
-            episode.space, episode.domain.atom_space, partial(self._planner_over, episode)
+            episode.space,
+            episode.domain.atom_space,
+            partial(self._planner_over, episode, is_canceled),
         )
         await run_in_executor(self._workers, partial(planner.prepare, start.state))
         timeout_s = self._settings.server_timeout * self._patience
@@ -180,10 +188,12 @@ class PlannerNode(Node):
             patience=self._patience,
         )
 
-    def _planner_over(self, episode: Episode, known: State) -> Planner:
+    def _planner_over(
+        self, episode: Episode, is_canceled: Callable[[], bool], known: State
+    ) -> Planner:
         """A planner over the objects of a state."""
-        shortcuts = self._shortcuts.grounded(episode, known)
-        return make_planner(self._settings.planner, episode.domain, known, shortcuts)
+        shortcuts, name = self._shortcuts.grounded(episode, known), self._settings.planner
+        return make_planner(name, episode.domain, known, shortcuts, is_canceled)
 
 
 def main() -> int:

@@ -4,11 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Self
 
 from slap_ros.core import ActionSpace, Domain, GradualSkill, World
-from slap_ros.errors import ErrorCode, InvalidStateError, SkillNotApplicableError
+from slap_ros.errors import (
+    ErrorCode,
+    InvalidStateError,
+    SkillNotApplicableError,
+    TaskCanceledError,
+)
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State, Target
 
@@ -42,6 +48,10 @@ class Rollout:
         return self.steps > 0 and not self.reached
 
 
+def _never() -> bool:
+    return False
+
+
 class Model:
     """The known transition function (the paper's f).
 
@@ -49,26 +59,35 @@ class Model:
     made once and then cached; the oldest are forgotten, so that a long run needs no more memory.
     """
 
-    def __init__(self, world: World, space: AtomSpace, actions: ActionSpace) -> None:
+    def __init__(
+        self,
+        world: World,
+        space: AtomSpace,
+        actions: ActionSpace,
+        is_canceled: Callable[[], bool] = _never,
+    ) -> None:
         """Start with an empty cache.
 
         Args:
             world: World in which options are rolled out; nobody else may use it.
             space: The task's atoms.
             actions: What the robot can do.
+            is_canceled: Whether nobody wants a plan any more; asked before each step.
         """
         self.space = space
         self.executed = 0  # roll-outs made so far; those from the cache do not count
         self._world = world
         self._actions = actions
+        self._is_canceled = is_canceled
         self._cache: dict[Key, Rollout] = {}
         self._begun: dict[Key, None] = {}  # roll-outs of which a part was made
         self._ends: dict[bytes, None] = {}  # keys of the states in which roll-outs ended
 
     @classmethod
-    def of(cls, domain: Domain, initial: State) -> Self:
-        """A model for the tasks over these objects."""
-        return cls(domain.model_world(initial), domain.atom_space(initial), domain.action_space)
+    def of(cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = _never) -> Self:
+        """A model for the tasks over these objects; for the last argument see the class."""
+        space = domain.atom_space(initial)
+        return cls(domain.model_world(initial), space, domain.action_space, is_canceled)
 
     def knows(self, option: Option, state: State, target: Target) -> bool:
         """Whether a roll-out was made or begun before.
@@ -126,13 +145,14 @@ class Model:
 
         Raises:
             InvalidStateError: The world refuses the state, which no roll-out has led to.
+            TaskCanceledError: Nobody wants the plan any more.
         """
         key = (option, target, state.key)
         if key not in self._cache:
             if key not in self._begun:
                 self._begin(key)
-            del self._begun[key]
             self._cache[key] = self._simulate(option, state, target)
+            del self._begun[key]
             self._ends[self._cache[key].final.key] = None
             _forget_oldest(self._cache)
             _forget_oldest(self._ends)
@@ -148,6 +168,8 @@ class Model:
             result = OptionResult(error.code, str(error))
             return Rollout(False, 0, state, self.space.abstract(state), result)
         while True:
+            if self._is_canceled():
+                raise TaskCanceledError("canceled")
             abstract = self.space.abstract(state)
             action = execution.advance(state, abstract)
             if isinstance(action, OptionResult):

@@ -96,7 +96,11 @@ PLANNERS: Mapping[str, Make] = {
 
 
 def make_planner(
-    planner: str, domain: Domain, initial: State, shortcuts: ShortcutSource | None = None
+    planner: str,
+    domain: Domain,
+    initial: State,
+    shortcuts: ShortcutSource | None = None,
+    is_canceled: Callable[[], bool] = lambda: False,
 ) -> Planner:
     """A planner by name.
 
@@ -105,6 +109,8 @@ def make_planner(
         domain: For whose tasks.
         initial: A state with the objects of the tasks.
         shortcuts: Where shortcut edges come from; None for pure planning.
+        is_canceled: Whether nobody wants a plan any more; then its search ends with a
+            TaskCanceledError.
 
     Returns:
         The planner, with a model of its own.
@@ -115,7 +121,7 @@ def make_planner(
         NoSkillsError: The domain has no operators.
     """
     choice = require_planner(planner)
-    return PLANNERS[choice.name](Problem.of(domain, initial), shortcuts, choice.effort)
+    return PLANNERS[choice.name](Problem.of(domain, initial, is_canceled), shortcuts, choice.effort)
 
 
 def require_planner(planner: str) -> PlannerChoice:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -71,8 +71,16 @@ class Problem:
     exact: bool = True
 
     @classmethod
-    def of(cls, domain: Domain, initial: State) -> Problem:
+    def of(
+        cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = lambda: False
+    ) -> Problem:
         """The problem over the objects of ``initial``.
+
+        Args:
+            domain: Domain of the tasks.
+            initial: A state with the objects of the tasks.
+            is_canceled: Whether nobody wants a plan any more; see
+                :class:`~slap_ros.planning.model.Model`.
 
         Raises:
             NoSkillsError: The domain has no operators.
@@ -80,7 +88,7 @@ class Problem:
         space = domain.atom_space(initial)
         unskilled = ground_operators(domain.unskilled, space)
         options = ground_options(domain, space)
-        return cls(Model.of(domain, initial), options, unskilled, domain.exact)
+        return cls(Model.of(domain, initial, is_canceled), options, unskilled, domain.exact)
 
     def require_reachable(self, start: int, goal: int) -> None:
         """Refuse a goal that is easily seen to be out of reach.
