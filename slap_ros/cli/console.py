@@ -19,6 +19,7 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 from functools import cached_property, wraps
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec
 
 import typer
@@ -129,7 +130,7 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
         except (typer.Exit, typer.Abort):
             raise
         except Exception as error:
-            _fail(ErrorCode.INTERNAL_ERROR, _internal_complaint(error), error)
+            _fail(*_unforeseen(error), error)
         raise typer.Exit(code or 0)
 
     return run
@@ -160,27 +161,47 @@ def _os_complaint(error: OSError) -> str:
     return f"{what}: {where}; check the path, and the disk" if path else f"{what} (stdout?)"
 
 
-def _internal_complaint(error: Exception) -> str:
-    """What happened, in a line; the rest is kept in a file, which is named.
+def _unforeseen(error: Exception) -> tuple[ErrorCode, str]:
+    """Whose fault it is, and what happened, in a line; the rest is kept in a file, which is named.
 
     The line has no arguments of the exception: nobody foresaw it, so nobody knows what they are.
     The file has its message, without the secrets of the environment.
     """
+    what, log = type(error).__name__, _kept(error)
+    frames = list(traceback.walk_tb(error.__traceback__))
+    for frame, line in reversed(frames):
+        package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if package in _packages_of_domains():
+            return ErrorCode.INVALID_DOMAIN, (
+                f"the domain's own code fails: {what} in {_name_of(frame)}, line {line}, of the "
+                f"package {package}; the traceback is in {log}"
+            )
+    place = f" in {_name_of(frames[-1][0])}, line {frames[-1][1]}" if frames else ""
+    return ErrorCode.INTERNAL_ERROR, (
+        f"this is a fault of slap: {what}{place}; please report it with {log}"
+    )
+
+
+def _packages_of_domains() -> set[str]:
+    """Packages of other distributions that register domains."""
+    from slap_ros.domains.registry import registrations
+
+    return {entry.module.partition(".")[0] for entry in registrations().entries}
+
+
+def _name_of(frame: FrameType) -> str:
+    """Name of the file that a frame is in."""
+    return Path(frame.f_code.co_filename).name
+
+
+def _kept(error: Exception) -> Path:
+    """The file with an exception's traceback."""
     told = "".join(traceback.format_exception(error))
     with tempfile.NamedTemporaryFile(
         "w", prefix="slap-", suffix=".log", delete=False, encoding="utf-8", errors="replace"
     ) as log:
         log.write(without_secrets(told))
-    return (
-        f"this is a fault of slap: {type(error).__name__}{_place(error)}; please report it with "
-        f"{Path(log.name)}"
-    )
-
-
-def _place(error: Exception) -> str:
-    """Where an exception was raised: the last line of a file that it went through."""
-    frames = traceback.extract_tb(error.__traceback__)
-    return f" in {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+    return Path(log.name)
 
 
 def warn(text: str) -> None:

@@ -263,6 +263,7 @@ class Domain(ShownInNotebooks):
 
         Raises:
             InvalidParameterError: A seed or an index that is negative or no whole number.
+            InvalidDomainError: What the domain samples is no task.
             UnknownGoalError: No such goal.
             UnknownObjectError: No task has the objects of that goal.
         """
@@ -274,7 +275,7 @@ class Domain(ShownInNotebooks):
     def _sampled(self, rng: np.random.Generator, goal: str | None) -> Task:
         """The next task of a stream, or the next that has the objects of a named goal."""
         if goal is None:
-            return self.sample_task(rng)
+            return self._drawn(rng)
         if goal not in self.goals:
             raise UnknownGoalError(
                 f"domain {self.name} has no goal {goal!r}; there are "
@@ -282,8 +283,17 @@ class Domain(ShownInNotebooks):
             )
         for _ in range(MOST_DRAWN - 1):
             with suppress(UnknownObjectError):
-                return self._posed(self.sample_task(rng), goal)
-        return self._posed(self.sample_task(rng), goal)
+                return self._posed(self._drawn(rng), goal)
+        return self._posed(self._drawn(rng), goal)
+
+    def _drawn(self, rng: np.random.Generator) -> Task:
+        """The next task of a stream, by the domain's own code."""
+        task = self.sample_task(rng)
+        if not isinstance(task, Task):
+            raise InvalidDomainError(
+                f"domain {self.name}: sample_task gives {type(task).__name__}, expected a Task"
+            )
+        return task
 
     def _posed(self, task: Task, goal: str) -> Task:
         """The task with a goal that goes by a name."""

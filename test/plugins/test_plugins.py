@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -213,3 +214,40 @@ def test_nodes_of_their_own_run_a_strangers_default(install, network, tmp_path):
     )
     assert run.returncode == 0, run.stderr
     assert json.loads(run.stdout)["preset"] == "narrow"
+
+
+# A domain that can be made, and fails once it is used.
+FAILING = """
+from dataclasses import replace
+from support import sweeping
+
+
+def make():
+    sound = sweeping.make()
+    first, *others = sound.predicates
+
+    def classifier(state, *columns):
+        return {}["token=of-a-lab"]
+
+    return replace(
+        sound, name="stranger", predicates=(replace(first, classifier=classifier), *others)
+    )
+
+
+def undrawn():
+    return replace(sweeping.make(), name="undrawn", sample_task=lambda rng: None)
+"""
+
+
+def test_a_mistake_in_a_domains_own_code_is_no_fault_of_ours(install):
+    install({"stranger": "stranger:make", "undrawn": "stranger:undrawn"}, stranger=FAILING)
+    failed = CliRunner().invoke(app, ["plan", "stranger"])
+    assert failed.exit_code == ErrorCode.INVALID_DOMAIN
+    assert "KeyError in stranger.py, line 11, of the package stranger" in failed.stderr
+    assert "token" not in failed.stderr
+    log = Path(failed.stderr.split()[-1])
+    assert "KeyError: 'token=of-a-lab'" in log.read_text(encoding="utf-8")
+    log.unlink()
+    failed = CliRunner().invoke(app, ["plan", "undrawn"])
+    assert failed.exit_code == ErrorCode.INVALID_DOMAIN
+    assert "sample_task gives NoneType, expected a Task" in failed.stderr
