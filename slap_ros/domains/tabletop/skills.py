@@ -73,8 +73,8 @@ class TrajectoryFollower:
     Closed loop: each action is the difference from where the arm is. A real arm lags behind; where
     the difference is more than a step may be, the action is as far in that direction as it may be.
     If that leaves more than LAG, the same waypoint is tried again, a few times at most, as an arm
-    that is blocked never gets there. Fingers close once they are around what is aimed at: an arm
-    that shakes, or has pushed it, would close them beside it.
+    that is blocked never gets there. Fingers close once they are around what is aimed at, or the
+    arm does not move any more: an arm that shakes, or has pushed it, would close them beside it.
     """
 
     def __init__(
@@ -92,6 +92,7 @@ class TrajectoryFollower:
         self._max_step = np.array(max_step)
         self._tries = TRIES
         self._aim, self._aim_steps = aim, AIM_STEPS
+        self._aimed_from: Joints | None = None  # where the arm was when it was last sent there
 
     def __call__(self, state: State) -> Action | None:
         """The next action; None at the end of the trajectory."""
@@ -118,6 +119,9 @@ class TrajectoryFollower:
         """Where the arm goes before the fingers close; None where they are to close now."""
         if self._aim is None or self._aim_steps == 0:
             return None
+        before, self._aimed_from = self._aimed_from, joints_of(state)
+        if before is not None and float(np.abs(self._aimed_from - before).max()) <= LAG:
+            return None  # something is in its way
         return self._aim.corrected(grasp, state)
 
     def _excess(self, missing: Joints) -> float:
