@@ -9,13 +9,13 @@ for each. An interrupted command goes on after the jobs that have ended, to the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from slap_ros.learning.json_lines import append_line, whole_lines
-from slap_ros.learning.work_folder import DECODING_ERRORS, WorkFolder, damaged
+from slap_ros.learning.json_lines import append_line, decoded_lines
+from slap_ros.learning.work_folder import WorkFolder
 
 Result = TypeVar("Result")
 
@@ -41,11 +41,8 @@ class FinishedJobs:
         """
         if not self.path.exists():
             return {}
-        try:
-            entries = whole_lines(self.path)
-            return {int(one["job"]): one["result"] for one in entries if one["step"] == step}
-        except DECODING_ERRORS as error:
-            raise damaged(self.path, error, "remove it to have it made again") from error
+        entries = decoded_lines(self.path, _entry, "remove it to have it made again")
+        return {number: result for whose, number, result in entries if whose == step}
 
     def add(self, step: str, number: int, result: Any) -> None:
         """Keep what a job has come to.
@@ -61,6 +58,11 @@ class FinishedJobs:
     def remove(self) -> None:
         """Remove the file, once the whole result is written."""
         self.path.unlink(missing_ok=True)
+
+
+def _entry(line: Mapping[str, Any]) -> tuple[str, int, Any]:
+    """Step, number and result of a job."""
+    return str(line["step"]), int(line["job"]), line["result"]
 
 
 def cached_jobs(

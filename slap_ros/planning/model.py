@@ -153,12 +153,16 @@ class Model:
                 self._begin(key)
             self._cache[key] = self._simulate(option, state, target)
             del self._begun[key]
-            self._ends[self._cache[key].final.key] = None
             _forget_oldest(self._cache)
-            _forget_oldest(self._ends)
         return self._cache[key]
 
     def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
+        rollout = self._execute(option, state, target)
+        self._ends[rollout.final.key] = None
+        _forget_oldest(self._ends)
+        return rollout
+
+    def _execute(self, option: Option, state: State, target: Target) -> Rollout:
         if (refusal := self._reset_to(state)) is not None:
             return Rollout(False, 0, state, self.space.abstract(state), refusal)
         is_behind = False  # the world, where steps were foreseen

@@ -12,9 +12,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Protocol
 
-from slap_ros.learning.json_lines import whole_lines
+from slap_ros.learning.json_lines import decoded_lines
 from slap_ros.learning.stored_keys import restored, stored
-from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.policies.library_files import replace_folder
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -59,12 +58,9 @@ def latest(folder: ShortcutWorkFolder) -> dict[int, Progress]:
     """
     if not folder.progress.exists():
         return {}
-    try:
-        lines = whole_lines(folder.progress)
-        return {int(line["stage"]): _restored(line) for line in lines}
-    except DECODING_ERRORS as error:
-        advice = "remove the folder to learn the shortcut again"
-        raise damaged(folder.progress, error, advice) from error
+    advice = "remove the folder to learn the shortcut again"
+    lines = decoded_lines(folder.progress, lambda one: (int(one["stage"]), _restored(one)), advice)
+    return dict(lines)
 
 
 def _restored(line: Mapping[str, Any]) -> Progress:

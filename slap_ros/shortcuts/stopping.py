@@ -8,14 +8,13 @@ planning, and only the shortest success counts. So plans are made for validation
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any
 
-from slap_ros.learning.json_lines import append_line, whole_lines
-from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
+from slap_ros.learning.json_lines import append_line, decoded_lines
 
 
 @dataclass(frozen=True)
@@ -110,18 +109,15 @@ def read_validations(path: Path) -> list[Validation]:
     """
     if not path.exists():
         return []
-    try:
-        return [
-            Validation(
-                int(line["stage"]),
-                int(line["steps"]),
-                inf if line["plan_length"] is None else float(line["plan_length"]),
-            )
-            for line in whole_lines(path)
-        ]
-    except DECODING_ERRORS as error:
-        advice = "remove the folder to learn the shortcut again"
-        raise damaged(path, error, advice) from error
+    return decoded_lines(path, _validation, "remove the folder to learn the shortcut again")
+
+
+def _validation(line: Mapping[str, Any]) -> Validation:
+    """The validation in a line; null is no length."""
+    length = line["plan_length"]
+    return Validation(
+        int(line["stage"]), int(line["steps"]), inf if length is None else float(length)
+    )
 
 
 def validation_record(path: Path) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from slap_ros.policies.shipped_models import shipped_with_siblings
 from slap_ros.skills.skill_library import read_library_record
 from slap_ros.studies.figures import label
 from slap_ros.studies.growth_table import growth_table
+from slap_ros.studies.mujoco_table import mujoco_table
 from slap_ros.studies.reproducing import NOT_MEASURED, other_table, paper_table
 from slap_ros.studies.results import MarkdownTable
 
@@ -314,6 +315,7 @@ def _with_interval(value: float | None, interval: Mapping[str, float] | None) ->
 
 TABLES: Mapping[str, Callable[[Path], MarkdownTable]] = {
     "slap": front_table,
+    "mujoco": mujoco_table,
     "lg_sail": front_skill_table,
     "table1": main_table,
     "presets": preset_table,

@@ -7,10 +7,11 @@ from __future__ import annotations
 import json
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_bytes, require_regular, require_sole_use
+from slap_ros.learning.json_lines import cut_off_half_a_line, whole_lines
 from slap_ros.studies.results import Provenance
 
 
@@ -38,7 +39,7 @@ class StudyLog:
         self.results: dict[str, Any] = {}  # by the job's name
         self.cpu_seconds = 0.0  # of all jobs so far
         self._header = {"command": origin.command, "settings": origin.settings}
-        self._file: TextIO | None = None
+        self._file: BinaryIO | None = None
         if path.exists():
             self._file = self._open()
 
@@ -77,24 +78,24 @@ class StudyLog:
         """Remove the file, once its study is written."""
         self.path.unlink(missing_ok=True)
 
-    def _open(self) -> TextIO:
+    def _open(self) -> BinaryIO:
         """Open the file, made where there is none, and read what it has."""
         if self.path.exists():
             require_regular(self.path)
         with ExitStack() as unless_refused:
-            file = unless_refused.enter_context(self.path.open("a", encoding="utf-8"))
+            file = unless_refused.enter_context(self.path.open("a+b"))
             require_sole_use(file.fileno(), self.path)
             self._read(file)
             unless_refused.pop_all()
         return file
 
-    def _read(self, file: TextIO) -> None:
+    def _read(self, file: BinaryIO) -> None:
         """Read the results, and cut off a last line that is not whole."""
         try:
-            content = read_bytes(self.path)
-            whole = content[: content.rfind(b"\n") + 1]
-            if whole or not _line(self._header).encode().startswith(content):
-                header, *entries = map(parse_json, whole.splitlines())
+            lines = whole_lines(self.path)
+            # A process that was killed early left half of the first line, or nothing.
+            if lines or not _line(self._header).startswith(read_bytes(self.path)):
+                header, *entries = lines
                 self._require_same(header["command"], header.get("settings"))
                 self.results = {str(entry["job"]): entry["result"] for entry in entries}
                 # Logs of version 0.1.0 do not have it.
@@ -103,7 +104,7 @@ class StudyLog:
             raise InvalidParameterError(
                 f"{self.path} is no log of a study ({error!r}); remove it"
             ) from error
-        file.truncate(len(whole))  # there is more where it was killed as it wrote a line
+        cut_off_half_a_line(file)
 
     def _require_same(self, command: str, settings: Any) -> None:
         if command != self._header["command"]:
@@ -118,5 +119,5 @@ class StudyLog:
             )
 
 
-def _line(data: Any) -> str:
-    return json.dumps(data) + "\n"
+def _line(data: Any) -> bytes:
+    return json.dumps(data).encode() + b"\n"

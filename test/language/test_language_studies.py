@@ -29,7 +29,7 @@ from slap_ros.studies.lg_sail.reward_ablation import FULL, HEADERS
 from slap_ros.studies.lg_sail.reward_ablation import study as reward_ablation
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport, write
 from slap_ros.studies.study_log import StudyLog
-from support.model_answers import SETTINGS, decomposition_json, operator_json
+from support.model_answers import SETTINGS, decomposition_json, operator_json, plan_json
 from support.paper_problems import peg_in_hole
 from support.scripted_server import Step, serving
 
@@ -53,13 +53,6 @@ class Silent:
     def advance(self) -> None: ...
 
     def report_failure(self, complaint: str) -> None: ...
-
-
-def plan_json(steps: Sequence[str]) -> str:
-    written = [step.rstrip(")").split("(") for step in steps]
-    return json.dumps(
-        {"plan": [{"action": name, "objects": rest.split(", ")} for name, rest in written]}
-    )
 
 
 def runner(folder: Path) -> JobRunner:

@@ -114,5 +114,5 @@ def test_a_line_that_was_not_written_to_its_end_counts_for_nothing(tmp_path, und
 def test_a_damaged_file_is_refused_by_name(tmp_path, line):
     kept = interrupted(tmp_path / "work")
     kept.write_text(f"{line}\n{kept.read_text()}")
-    with pytest.raises(InvalidParameterError, match=r"\.whole\.jsonl: damaged.*remove it"):
+    with pytest.raises(InvalidParameterError, match=r"\.whole\.jsonl, line 1: damaged.*remove it"):
         made(tmp_path / "work", Interrupting())

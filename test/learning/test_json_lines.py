@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-from slap_ros.learning.json_lines import append_line, whole_lines
+from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.json_lines import append_line, decoded_lines, whole_lines
 
 FIRST, SECOND = {"a": [1e300, None], "b": "∅"}, {"a": []}
 WHOLE = json.dumps(FIRST) + "\n"
@@ -37,3 +38,18 @@ def test_what_is_no_json_is_refused(tmp_path):
         path.write_text(text)
         with pytest.raises(ValueError):
             whole_lines(path)
+
+
+@pytest.mark.parametrize("line", ["{", "[]", '{"b": 1}', '{"a": "x"}'])
+def test_a_line_that_says_something_else_is_named(tmp_path, line):
+    path = tmp_path / "lines.jsonl"
+    path.write_text('{"a": 1}\n{"a": 2}\n{"a')
+    assert decoded_lines(path, lambda data: int(data["a"]), "remove it") == [1, 2]
+    path.write_text(f'{{"a": 1}}\n{line}\n{{"a": 2}}\n')
+    with pytest.raises(InvalidParameterError, match=r"lines\.jsonl, line 2: damaged: .*remove it"):
+        decoded_lines(path, lambda data: int(data["a"]), "remove it")
+
+
+def test_a_file_that_is_not_there_is_refused_with_advice(tmp_path):
+    with pytest.raises(InvalidParameterError, match=r"none\.jsonl: damaged: .*remove it"):
+        decoded_lines(tmp_path / "none.jsonl", str, "remove it")

@@ -37,7 +37,7 @@ def test_tables_of_pages_are_those_of_the_data():
     named = {
         page: {n for _, n, _ in PLACE.findall(page.read_text(encoding="utf-8"))} for page in PAGES
     }
-    assert named[ROOT / "README.md"] == {"slap", "lg_sail"}
+    assert named[ROOT / "README.md"] == {"slap", "mujoco", "lg_sail"}
     assert named[PUBLISHED / "README.md"] == {"table1", "skills"}
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
@@ -205,10 +205,39 @@ def test_what_noise_costs_is_said_as_measured():
 
 
 @pytest.mark.parametrize(
+    "name", sorted(n for n, d in RESULTS.items() if d.get("study") in ("transfer", "camera"))
+)
+def test_tasks_and_steps_in_mujoco_are_said_as_measured(name):
+    """Wherever a page says them, before a link to the page of the results."""
+    (*_, (pure, slap)) = RESULTS[name]["found"].values()
+    steps = [f"{one['plan_length']['mean']:.1f}" for one in (pure, slap)]
+    tasks = len(slap["trials"])
+    solved = [sum(trial["success"] for trial in one["trials"]) for one in (pure, slap)]
+    numbers = {"all" if count == tasks else str(count) for count in solved}
+    said = [
+        sentence
+        for page in ("camera", "mujoco", "real-robot")
+        for sentence in re.findall(
+            rf"Of {tasks} (?:(?!Of {tasks} ).)*?\(\[page\]\(results/{name}\.md",
+            (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"),
+            re.IGNORECASE,
+        )
+    ]
+    assert said
+    for sentence in said:
+        assert re.findall(r"\b\d+\.\d\b", sentence) == steps, sentence
+        assert numbers <= set(re.findall(r"\w+", sentence)), sentence
+
+
+@pytest.mark.parametrize(
     ("page", "said"),
     [
         ("<!-- table9: slap study readme -->\n<!-- end -->\n", "there is no table 'table9'"),
         ("<!-- table1: slap study readme -->\n<!-- end -->\n", "no data in"),
+        (
+            "<!-- mujoco: slap study readme -->\n<!-- end -->\n",
+            "make it with `slap study transfer obstacle_tower`",
+        ),
     ],
 )
 def test_a_page_is_left_as_it_is_where_a_table_cannot_be_made(tmp_path, page, said):

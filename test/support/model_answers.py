@@ -51,6 +51,14 @@ def operator_json(operator: LiftedOperator) -> str:
     return json.dumps(operator_data(operator))
 
 
+def plan_json(steps: Sequence[str]) -> str:
+    """A plan of steps such as ``Pick(peg1)``."""
+    written = [step.rstrip(")").split("(") for step in steps]
+    return json.dumps(
+        {"plan": [{"action": name, "objects": rest.split(", ")} for name, rest in written]}
+    )
+
+
 def operator_text(operator: LiftedOperator) -> str:
     """The paper's block."""
 

@@ -77,7 +77,7 @@ class PlanRollout:
         task: Index of the task.
         plan: Ground operators of the plan, as text.
         stages: Stages that were begun, in order.
-        unplanned: Reason why there is no plan, in words; empty where there is one.
+        unplanned: Reason why there is no plan to the goal, in words; empty where there is one.
     """
 
     task: int

@@ -28,6 +28,8 @@ MAX_ACTIONS = 32
 MAX_GROUNDINGS = 5_000  # groundings of one operator; more would only keep the planner busy
 DECOMPOSITION = "decomposition"
 
+Atoms = frozenset[LiftedAtom]
+
 _VARIABLE = re.compile(r"\?[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
@@ -91,6 +93,15 @@ class _Checker:
             )
             self.complain(ComplaintClass.UNKNOWN_TYPE, fact)
         return types.get(word)
+
+    def operator(self, draft: OperatorDraft) -> tuple[dict[str, Variable], Atoms, Atoms, Atoms]:
+        """The variables by name, PRE, EFF- and EFF+, as far as they can be made of a draft."""
+        variables = self.parameters(draft.parameters)
+        given = {parameter.name for parameter in draft.parameters}
+        before = self.atoms("PRE", draft.preconditions, variables, given)
+        deleted = self.atoms("EFF-", draft.delete_effects, variables, given)
+        added = self.atoms("EFF+", draft.add_effects, variables, given)
+        return variables, before, deleted, added
 
     def atoms(
         self,
@@ -219,11 +230,7 @@ def check_operator(
     if draft.name is not None and draft.name != name:
         fact = f"{name} was asked for, the answer describes {shown(draft.name)}"
         checker.complain(ComplaintClass.WRONG_NAME, fact)
-    variables = checker.parameters(draft.parameters)
-    given = {parameter.name for parameter in draft.parameters}
-    before = checker.atoms("PRE", draft.preconditions, variables, given)
-    deleted = checker.atoms("EFF-", draft.delete_effects, variables, given)
-    added = checker.atoms("EFF+", draft.add_effects, variables, given)
+    variables, before, deleted, added = checker.operator(draft)
     _check_use(checker, draft)
     _check_effects(checker, before, deleted, added)
     _check_size(checker, tuple(variables.values()))
@@ -232,6 +239,22 @@ def check_operator(
     differ = tuple((variables[one], variables[other]) for one, other in draft.inequalities)
     operator = LiftedOperator(name, tuple(variables.values()), before, added, deleted, differ)
     return operator, checker.complaints
+
+
+def read_operator(draft: OperatorDraft, name: str, problem: AcquisitionProblem) -> LiftedOperator:
+    """What can be read of an operator, whatever is wrong with it; nothing is checked.
+
+    Args:
+        draft: Draft of the operator, as it is written.
+        name: Name of the operator.
+        problem: Problem that the operator is for.
+
+    Returns:
+        The operator without the parameters and atoms that mean nothing in the problem. What is
+        both added and deleted is added.
+    """
+    variables, before, deleted, added = _Checker(f"operator {name}", problem).operator(draft)
+    return LiftedOperator(name, tuple(variables.values()), before, added, deleted - added)
 
 
 def _check_use(checker: _Checker, draft: OperatorDraft) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -87,8 +87,9 @@ class LibraryProgress:
 
     @property
     def failures(self) -> Counter[str]:
-        """Stages that failed, by operator."""
-        return Counter(r.failure.operator for r in self.rollouts if r.failure is not None)
+        """Stages that failed, by operator, and plans that do not lead to the goal, by reason."""
+        failed = [rollout for rollout in self.rollouts if rollout.progress < 1.0]
+        return Counter(r.failure.operator if r.failure else _reason(r) for r in failed)
 
     def as_json(self) -> dict[str, Any]:
         """The summary, and every task: of each stage operator, environment steps, why it failed."""
@@ -97,14 +98,19 @@ class LibraryProgress:
             "seed": self.seed,
             "progress": self.progress,
             "failures": dict(self.failures),
-            "tasks": [
-                {
-                    "progress": rollout.progress,
-                    "stages": list(map(_in_words, rollout.stages)),
-                }
-                for rollout in self.rollouts
-            ],
+            "tasks": list(map(_task_in_words, self.rollouts)),
         }
+
+
+def _reason(rollout: PlanRollout) -> str:
+    """Why there is no plan, without the objects of the task."""
+    return rollout.unplanned.partition(":")[0]
+
+
+def _task_in_words(rollout: PlanRollout) -> dict[str, Any]:
+    stages = list(map(_in_words, rollout.stages))
+    why = {"unplanned": rollout.unplanned} if rollout.unplanned else {}
+    return {"progress": rollout.progress, "stages": stages, **why}
 
 
 def _in_words(stage: Stage) -> str:
@@ -144,7 +150,7 @@ class LibrariesProgress:
 
     @property
     def failures(self) -> str:
-        """Stages that failed of all libraries, by operator, in words."""
+        """What failed of all libraries, in words: see :attr:`LibraryProgress.failures`."""
         failures = sum((library.failures for library in self.libraries), Counter[str]())
         return ", ".join(f"{name} {count}" for name, count in failures.most_common()) or "none"
 
@@ -306,10 +312,12 @@ def carry_out(
         A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON, without states.
     """
     task = task_with_goal(domain, seed, index, goal)
-    rollout = roll_out(domain, task, index, domain.operators, skills).as_json()
-    for stage in rollout["stages"]:
-        stage["state"] = ()
-    return rollout
+    return without_states(roll_out(domain, task, index, domain.operators, skills))
+
+
+def without_states(rollout: PlanRollout) -> dict[str, Any]:
+    """A rollout as JSON, without the states in which skills began."""
+    return replace(rollout, stages=tuple(replace(s, state=()) for s in rollout.stages)).as_json()
 
 
 def draw(figure: Figure, goals: Sequence[GoalProgress]) -> None:

@@ -2,30 +2,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """Attempts of a language model at operators, plans and rewards, each without a second chance.
 
-What studies count: an attempt at operators is a decomposition and an operator for each of its
+What studies count. An attempt at operators is a decomposition and an operator for each of its
 actions, asked for once. It succeeds where all pass their checks and chain to the goal. It ends with
 the first answer that does not pass: what would follow costs, and changes nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 from slap_ros.acquisition.proposals.attempt_log import AttemptLog
 from slap_ros.acquisition.proposals.complaints import Complaint, serious
+from slap_ros.acquisition.proposals.drafts import check_decomposition, read_operator
 from slap_ros.acquisition.proposals.inquiry import Answer, Inquiry, Question
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.acquisition.proposals.questions import (
+    Actions,
     about_decomposition,
     about_operator,
     about_plan,
     about_reward,
+    action_name,
 )
 from slap_ros.acquisition.proposals.verification import verify
 from slap_ros.errors import InvalidCassetteError
+from slap_ros.imitation.unchecked_plans import UncheckedPlan, UncheckedStep
 from slap_ros.language.budget import Budget, BudgetLimits
+from slap_ros.language.formats import ActionDraft
 from slap_ros.language.request import Client, Reply, Request
 from slap_ros.language.settings import LanguageSettings
 from slap_ros.relational import LiftedOperator
@@ -190,6 +196,55 @@ def attempt_plan(
     asker = _Asker(inquiry)
     asker.ask(about_plan(operators, problem))
     return asker.attempt()
+
+
+def attempt_unchecked_plan(
+    inquiry: Inquiry, problem: AcquisitionProblem
+) -> tuple[Attempt, UncheckedPlan]:
+    """Ask once for a decomposition, its operators and a plan, and take what can be read of it.
+
+    Args:
+        inquiry: Conversation with the model.
+        problem: Problem to plan for: initial state and goal.
+
+    Returns:
+        What it cost, and the plan. Only an answer that cannot be read ends the attempt.
+    """
+    asker = _Asker(inquiry)
+    steps = _written_steps(asker, problem)
+    attempt = asker.attempt()
+    return attempt, UncheckedPlan(steps, "" if attempt.passed else attempt.verdict)
+
+
+def _written_steps(asker: _Asker, problem: AcquisitionProblem) -> tuple[UncheckedStep, ...]:
+    """The steps of a model's plan; none where an answer cannot be read."""
+    read_actions = partial(_each_once, problem=problem)
+    actions = asker.ask(_unchecked(about_decomposition(problem), read_actions)) or ()
+    operators: list[LiftedOperator] = []
+    for action in actions:
+        read = partial(read_operator, name=action_name(action), problem=problem)
+        operator = asker.ask(_unchecked(about_operator(action, actions, problem), read))
+        if operator is None:
+            return ()
+        operators.append(operator)
+    if not operators:
+        return ()
+    plan = asker.ask(_unchecked(about_plan(operators, problem), tuple)) or ()
+    return tuple(UncheckedStep.of(step, operators) for step in plan)
+
+
+def _unchecked(question: Question[D, Any], read: Callable[[D], T]) -> Question[D, T]:
+    """A question whose answer is taken for whatever it says."""
+    return replace(question, check=lambda draft: (read(draft), []))
+
+
+def _each_once(drafts: Sequence[ActionDraft], problem: AcquisitionProblem) -> Actions:
+    """The actions of a decomposition, the first of each name."""
+    actions, _ = check_decomposition(drafts, problem)
+    first: dict[str, str] = {}
+    for action in actions:
+        first.setdefault(action_name(action), action)
+    return tuple(first.values())
 
 
 def attempt_rewards(

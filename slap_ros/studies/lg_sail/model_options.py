@@ -22,11 +22,9 @@ from slap_ros.studies.results import StudyReport
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelOptions:
-    """Which models a study asks, about which tasks, and where it writes."""
+class LanguageOptions:
+    """Which models a study asks, and how."""
 
-    domain: DomainName
-    output: Output = RESULTS
     model: Annotated[
         list[str] | None,
         CommandOption(
@@ -45,16 +43,6 @@ class ModelOptions:
             "replay:FILE (repeat what a model answered)."
         ),
     ] = "live"
-    goal: Annotated[str | None, CommandOption("Name of a goal. Default: the domain's first.")] = (
-        None
-    )
-    seed: Annotated[int, CommandOption("Seed of the tasks.", least=0)] = 0
-    preset: Preset = None
-
-    @property
-    def jobs(self) -> int:
-        """Number of processes: models are asked one question at a time."""
-        return 1
 
     def models(self) -> dict[str, LanguageModel]:
         """The models to ask, by name.
@@ -96,6 +84,24 @@ class ModelOptions:
         return replace(
             report, circumstances={"answered_on": day, "recording_sha256": recording.digest}
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelOptions(LanguageOptions):
+    """Which models a study asks, about which tasks, and where it writes."""
+
+    domain: DomainName
+    output: Output = RESULTS
+    goal: Annotated[str | None, CommandOption("Name of a goal. Default: the domain's first.")] = (
+        None
+    )
+    seed: Annotated[int, CommandOption("Seed of the tasks.", least=0)] = 0
+    preset: Preset = None
+
+    @property
+    def jobs(self) -> int:
+        """Number of processes: models are asked one question at a time."""
+        return 1
 
     def problem(self, domain: Domain, index: int) -> AcquisitionProblem:
         """A task of the domain."""

@@ -9,7 +9,7 @@ share a row.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples
@@ -18,15 +18,13 @@ from slap_ros.api.library_descriptions import describe_library
 from slap_ros.api.shortcut_choice import SAMPLES, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
-from slap_ros.evaluation.experiment import Experiment, Trial
+from slap_ros.evaluation.approaches import approaches
+from slap_ros.evaluation.experiment import Experiment
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shipped import shipped_libraries
 from slap_ros.shortcuts.shortcut_library import Record, ShortcutLibrary
 from slap_ros.studies.comparison import (
     format_spread,
-    not_solved,
-    solve_task,
 )
 from slap_ros.studies.figures import LINES, label
 from slap_ros.studies.job_runner import JobRunner
@@ -34,11 +32,14 @@ from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, 
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_each
 from slap_ros.studies.slap.table1 import (
+    PURELY,
+    PlannedWay,
     Row,
     TrainedLibrary,
     open_library,
-    planning_jobs,
     relative_cell,
+    rows_of,
+    solved_in,
 )
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
@@ -87,19 +88,11 @@ def study(
         The report.
     """
     experiment = experiment.without_repetitions()
-    planned = [("", "", PURE_PLANNING)]
-    for trained in libraries:
-        approach = approaches(trained.library, chosen)[-1]
-        planned.append((trained.name, trained.library.digest, approach))
-    batches = [planning_jobs(experiment, *one) for one in planned]
-    preset = experiment.domain.preset
-    found = runner.run(preset, solve_task, Trial.from_json, *batches, failure=not_solved)
-    trials = [tuple(found[name] for name in batch) for batch in batches]
-    rows = [Row.of(experiment, PURE_PLANNING.name, {"": trials[0]}, trials[0])]
-    own = list(zip(libraries, trials[1:], strict=True))
-    for learner in dict.fromkeys(learner_of(one.library.record) for one in libraries):
-        of_it = {one.name: done for one, done in own if learner_of(one.library.record) == learner}
-        rows.append(Row.of(experiment, learner, of_it, trials[0]))
+    ways = [PlannedWay.of(one, approaches(one.library, chosen)[-1]) for one in libraries]
+    pure, *own = solved_in([PURELY, *ways], experiment, runner)
+    learners = [learner_of(one.library.record) for one in libraries]
+    of_learners = [replace(one, approach=name) for name, one in zip(learners, own, strict=True)]
+    rows = rows_of(experiment, [pure, *of_learners])
     costs = [_costs([one.library for one in libraries], row.approach) for row in rows]
     return StudyReport(
         study="learners",

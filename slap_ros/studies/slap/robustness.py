@@ -21,7 +21,7 @@ from slap_ros.api.library_descriptions import describe_library
 from slap_ros.api.shortcut_choice import SAMPLES, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches
+from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Spread
 from slap_ros.perception import NoisyPerceiver, Quality
@@ -29,20 +29,22 @@ from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.partial import PartialPlanner
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import shipped_libraries
-from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.comparison import PlanningSetup, format_spread, named_tasks, not_solved
+from slap_ros.studies.comparison import PlanningSetup, format_spread
 from slap_ros.studies.figures import APPROACH_STYLES, label
-from slap_ros.studies.job_runner import Job, JobRunner
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
 from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval
 from slap_ros.studies.slap.table1 import (
-    LibraryTrials,
+    PURELY,
+    PlannedWay,
     Row,
     TrainedLibrary,
     open_library,
     relative_cell,
+    rows_of,
+    solved_in,
 )
 from slap_ros.studies.study import PreparedStudy, format_steps
 
@@ -108,21 +110,6 @@ class RobustnessStudy:
     papers: tuple[PapersRow, ...]
     preset: str | None = None
     hides_top: bool = False
-
-
-@dataclass(frozen=True)
-class PlannedWay:
-    """A library, and how it is planned with.
-
-    Args:
-        library: Name of the library; empty for pure planning.
-        digest: Digest of the library; empty for pure planning.
-        approach: Way to plan.
-    """
-
-    library: str
-    digest: str
-    approach: Approach
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,8 +195,8 @@ def prepare(
             f"there is nothing to compare with pure planning in {options.domain}: give a shortcut "
             "library with --library"
         )
-    ways = [PlannedWay("", "", PURE_PLANNING)]
-    ways += [_way(one, approaches(one.library, sampling(options.samples))[-1]) for one in trained]
+    chosen = sampling(options.samples)
+    ways = [PlannedWay.of(one, approaches(one.library, chosen)[-1]) for one in trained]
     own = {
         "preset": domain.preset,
         "tasks": options.tasks,
@@ -222,7 +209,7 @@ def prepare(
     conditions = made.hides_top, options.max_replans
     return PreparedStudy(
         {**own, "libraries": described(trained), **(settings or {})},
-        lambda runner: _study(made, experiment, (*ways, *more), conditions, runner),
+        lambda runner: _study(made, experiment, (PURELY, *ways, *more), conditions, runner),
         {"library": options.libraries, **own, **(given or {})},
     )
 
@@ -238,10 +225,6 @@ def described(trained: Sequence[TrainedLibrary]) -> list[dict[str, Any]]:
     ]
 
 
-def _way(trained: TrainedLibrary, approach: Approach) -> PlannedWay:
-    return PlannedWay(trained.name, trained.library.digest, approach)
-
-
 def renamed_way(trained: TrainedLibrary, samples: int, name: str) -> PlannedWay:
     """Planning with a library, as an approach of another name.
 
@@ -254,7 +237,7 @@ def renamed_way(trained: TrainedLibrary, samples: int, name: str) -> PlannedWay:
         The way to plan.
     """
     approach = approaches(trained.library, sampling(samples))[-1]
-    return _way(trained, replace(approach, name=name))
+    return PlannedWay.of(trained, replace(approach, name=name))
 
 
 def _study(
@@ -273,19 +256,8 @@ def _study(
         conditions: Whether the highest thing is hidden, and the largest number of replans.
         runner: Runner of the jobs.
     """
-    batches = [_batch(experiment, way, conditions) for way in ways]
-    what = experiment.domain.preset
-    found = runner.run(what, solve_task, Trial.from_json, *batches, failure=not_solved)
-    measured: dict[str, list[LibraryTrials]] = {}
-    for way, batch in zip(ways, batches, strict=True):
-        trials = tuple(found[name] for name in batch)
-        name = way.approach.name
-        measured.setdefault(name, []).append(LibraryTrials(way.library, name, trials))
-    baseline = measured[PURE_PLANNING.name][0].trials
-    rows = [
-        RobustnessRow(Row(what, name, len(experiment), tuple(results), baseline))
-        for name, results in measured.items()
-    ]
+    trials = solved_in(ways, experiment, runner, solve_task, conditions)
+    rows = [RobustnessRow(row) for row in rows_of(experiment, trials)]
     return StudyReport(
         study=made.name,
         source=made.source,
@@ -299,16 +271,6 @@ def _study(
         draw=lambda figure: draw(figure, rows, made.papers),
         size=(7.4, 1.0 + 0.45 * len(rows)),
     )
-
-
-def _batch(experiment: Experiment, way: PlannedWay, conditions: tuple[bool, int]) -> dict[str, Job]:
-    """The tasks of an experiment, for a way to plan."""
-    setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, way.approach)
-    whose = " ".join(filter(None, (way.library, way.digest, way.approach.name)))
-    return {
-        f"{experiment.domain.preset}, {whose}: {name}": (setup, *conditions, *task)
-        for name, task in named_tasks(experiment).items()
-    }
 
 
 def solve_task(

@@ -8,7 +8,7 @@ chosen by what it does here (SLAP Table 1).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import fmean
@@ -65,6 +65,29 @@ class TrainedLibrary:
 
     name: str
     library: ShortcutLibrary
+
+
+@dataclass(frozen=True)
+class PlannedWay:
+    """A library, and how it is planned with.
+
+    Args:
+        library: Name of the library; empty for pure planning.
+        digest: Digest of the library; empty for pure planning.
+        approach: Way to plan.
+    """
+
+    library: str
+    digest: str
+    approach: Approach
+
+    @classmethod
+    def of(cls, trained: TrainedLibrary, approach: Approach) -> PlannedWay:
+        """A way to plan with a library."""
+        return cls(trained.name, trained.library.digest, approach)
+
+
+PURELY = PlannedWay("", "", PURE_PLANNING)
 
 
 @dataclass(frozen=True)
@@ -244,45 +267,70 @@ def _rows(
         sampling: Settings of how shortcuts are tried out.
         runner: Runner of the jobs.
     """
-    domain = experiment.domain
-    planned = [("", "", PURE_PLANNING)]
+    planned = [PURELY]
     searched: set[tuple[str, ...]] = set()
     for trained in libraries:
-        search, *ways = _ways(trained.library, domain, sampling)
+        search, *ways = _ways(trained.library, experiment.domain, sampling)
         if _signatures(search) not in searched:  # nothing else tells searches apart: once is enough
             searched.add(_signatures(search))
             ways = [search, *ways]
-        planned += [(trained.name, trained.library.digest, way) for way in ways]
-    batches = [planning_jobs(experiment, *one) for one in planned]
-    found = runner.run(domain.preset, solve_task, Trial.from_json, *batches, failure=not_solved)
-    measured: dict[str, list[LibraryTrials]] = {}
-    for (library, _, way), batch in zip(planned, batches, strict=True):
-        trials = tuple(found[name] for name in batch)
-        measured.setdefault(way.name, []).append(LibraryTrials(library, way.name, trials))
-    baseline = measured[PURE_PLANNING.name][0].trials
+        planned += [PlannedWay.of(trained, way) for way in ways]
+    return rows_of(experiment, solved_in(planned, experiment, runner))
+
+
+def solved_in(
+    ways: Sequence[PlannedWay],
+    experiment: Experiment,
+    runner: JobRunner,
+    solve: Callable[..., Trial] = solve_task,
+    conditions: tuple[Any, ...] = (),
+) -> list[LibraryTrials]:
+    """Solve every task in every way.
+
+    Args:
+        ways: Ways to plan.
+        experiment: Tasks to solve.
+        runner: Runner of the jobs.
+        solve: Function that solves a task, of the setup, the conditions, a seed and an index.
+        conditions: What else the function is called with.
+
+    Returns:
+        The trials of each way.
+    """
+    batches = [_jobs(way, experiment, conditions) for way in ways]
+    preset = experiment.domain.preset
+    found = runner.run(preset, solve, Trial.from_json, *batches, failure=not_solved)
     return [
-        Row(domain.preset, name, len(experiment), tuple(results), baseline)
-        for name, results in measured.items()
+        LibraryTrials(way.library, way.approach.name, tuple(found[name] for name in batch))
+        for way, batch in zip(ways, batches, strict=True)
     ]
 
 
-def planning_jobs(
-    experiment: Experiment, library: str, digest: str, approach: Approach
-) -> dict[str, Job]:
-    """The tasks of an experiment, for an approach.
-
-    Args:
-        experiment: Tasks to solve.
-        library: Name of the library; empty for pure planning.
-        digest: Digest of the library.
-        approach: Way to plan.
-    """
-    setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, approach)
-    whose = " ".join(filter(None, (library, digest, approach.name)))
+def _jobs(way: PlannedWay, experiment: Experiment, conditions: tuple[Any, ...]) -> dict[str, Job]:
+    """The tasks of an experiment, for a way to plan."""
+    setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, way.approach)
+    whose = " ".join(filter(None, (way.library, way.digest, way.approach.name)))
     return {
-        f"{experiment.domain.preset}, {whose}: {name}": (setup, *task)
+        f"{experiment.domain.preset}, {whose}: {name}": (setup, *conditions, *task)
         for name, task in named_tasks(experiment).items()
     }
+
+
+def rows_of(experiment: Experiment, results: Sequence[LibraryTrials]) -> list[Row]:
+    """A row per approach, in the order of their first trials.
+
+    Args:
+        experiment: Tasks that were solved.
+        results: Trials with each library, pure planning among them.
+    """
+    by_approach: dict[str, list[LibraryTrials]] = {}
+    for one in results:
+        by_approach.setdefault(one.approach, []).append(one)
+    baseline = by_approach[PURE_PLANNING.name][0].trials
+    return [
+        Row(experiment.domain.preset, name, len(experiment), tuple(each), baseline)
+        for name, each in by_approach.items()
+    ]
 
 
 def _ways(library: ShortcutLibrary, domain: Domain, sampling: Sampling) -> tuple[Approach, ...]:

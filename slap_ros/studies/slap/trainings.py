@@ -12,12 +12,15 @@ from typing import Any
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
+from slap_ros.learning.json_lines import decoded_lines
 from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_shortcut
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+
+ADVICE = "give another work folder, or train again"  # where a file is damaged
 
 
 @dataclass(frozen=True)
@@ -161,12 +164,7 @@ def read_curve(path: Path) -> LearningCurve:
         InvalidParameterError: A line is damaged, or there is none; names file and line.
     """
     stages: dict[int, list[LearningPoint]] = {}
-    try:
-        complete = read_text(path).split("\n")[:-1]
-    except (OSError, ValueError) as error:
-        raise _damaged(path, error) from error
-    for number, line in enumerate(complete, start=1):
-        stage, point = _parse(line, f"{path}, line {number}")
+    for stage, point in decoded_lines(path, _point, ADVICE):
         points = stages.setdefault(stage, [])
         while points and points[-1].steps >= point.steps:
             points.pop()
@@ -182,21 +180,18 @@ def read_curve(path: Path) -> LearningCurve:
     return LearningCurve(path.parent.name, tuple(joined), tuple(begins[1:]))
 
 
-def _parse(line: str, where: str) -> tuple[int, LearningPoint]:
-    """Stage, and point with the steps of that stage."""
-    try:
-        data = parse_json(line)
-        length = None if data["length"] is None else float(data["length"])
-        stage, point = (
-            int(data["stage"]),
-            LearningPoint(int(data["steps"]), float(data["success"]), length),
-        )
-    except (LookupError, TypeError, ValueError, OverflowError) as error:
-        raise _damaged(where, error) from error
+def _point(line: Mapping[str, Any]) -> tuple[int, LearningPoint]:
+    """Stage, and point with the steps of that stage.
+
+    Raises:
+        LookupError, TypeError, ValueError, OverflowError: The line has no such figures.
+    """
+    length = None if line["length"] is None else float(line["length"])
+    point = LearningPoint(int(line["steps"]), float(line["success"]), length)
     numbers = [point.success, *([] if length is None else [length])]
     if not all(map(math.isfinite, numbers)) or not 0.0 <= point.success <= 1.0 or point.steps < 0:
-        raise _damaged(where, f"success {point.success}, length {length}, steps {point.steps}")
-    return stage, point
+        raise ValueError(f"success {point.success}, length {length}, steps {point.steps}")
+    return int(line["stage"]), point
 
 
 def _read(path: Path) -> Any:
@@ -211,4 +206,4 @@ def _read(path: Path) -> Any:
 
 
 def _damaged(where: Path | str, what: Exception | str) -> InvalidParameterError:
-    return damaged(where, what, "give another work folder, or train again")
+    return damaged(where, what, ADVICE)
