@@ -10,10 +10,8 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 from ensemble import encode
-from ensemble.cli.application import app
 from ensemble.client import RunClient
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
@@ -39,6 +37,7 @@ from slap_ros.report import read_report
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import SKILL
 from support.points import LOOSE, POINTS, PUT
+from support.slap_command import slap
 from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 SHARED = HealthCheck.function_scoped_fixture  # the library, which nothing changes
@@ -46,10 +45,6 @@ LIMIT_S = 120.0  # far more than anything here takes
 pytestmark = pytest.mark.usefixtures("points_installed")
 SOON = {"observation_timeout": 2.0}  # s, for a planner that will see no state
 IN_PROCESS = ("--in-process", "--patience", "10")  # for a loaded machine
-
-
-def slap(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def said(ran):

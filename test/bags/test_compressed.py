@@ -17,9 +17,7 @@ import pytest
 import yaml
 from backports import zstd
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.bags import (
     bag_digest,
     bag_info,
@@ -33,6 +31,7 @@ from slap_ros.errors import DamagedBagError, SlapError
 from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.typestore import definition, typestore
 from support.marks import slow
+from support.slap_command import slap
 from support.truthful_run import Published, Script, make
 
 MODES = (CompressionMode.FILE, CompressionMode.MESSAGE)
@@ -211,7 +210,7 @@ def test_every_command_takes_them(script: Script, tmp_path: Path) -> None:
         ("report", path, "--output", str(tmp_path / "run.html")),
         ("propose", *domain, "--demonstrations", path),
     ):
-        result = CliRunner().invoke(app, command)
+        result = slap(*command)
         assert result.exit_code == 0, (command, result.stderr)
 
 

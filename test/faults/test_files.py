@@ -11,9 +11,7 @@ from pathlib import Path
 
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from ensemble.entry_point import run_node
 from sim_node.node import SimNode
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
@@ -38,6 +36,7 @@ from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.slap.trainings import TrainingFolder
 from support.damage import DAMAGES
 from support.marks import slow
+from support.slap_command import slap
 from support.truthful_run import Script, record, under
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
@@ -258,7 +257,7 @@ def test_damaged_pddl_is_planned_for_or_refused(tmp_path, name, count):
     command = ["plan", *(str(tmp_path / part) for part in ("domain.pddl", "problem.pddl"))]
     codes = set()
     for case in damaged_files(tmp_path / name, FEW * count, name):
-        result = CliRunner().invoke(app, command)
+        result = slap(*command)
         assert isinstance(result.exception, SystemExit | None), (case, result.exception)
         assert result.exit_code != ErrorCode.UNKNOWN, case
         codes.add(ErrorCode(result.exit_code))

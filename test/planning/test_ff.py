@@ -13,9 +13,7 @@ from typing import Any, cast
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from slap_ros.cli import app
 from slap_ros.domains.registry import get_domain
 from slap_ros.errors import ErrorCode, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import build_abstract_graph
@@ -24,6 +22,7 @@ from slap_ros.planning.options import Option, OptionKind
 from slap_ros.relational import GroundOperator, LiftedOperator, ground_operators
 from slap_ros.relational.pddl import parse_domain, parse_problem
 from slap_ros.relational.pddl.grounder import ground_task
+from support.slap_command import slap
 
 Task = tuple[int, int, list[GroundOperator]]  # start, goal, operators
 NOTHING: frozenset[Any] = frozenset()
@@ -284,7 +283,7 @@ def plan_files(tmp_path, texts, *options):
     for name, text in zip(("domain.pddl", "problem.pddl"), texts, strict=True):
         (tmp_path / name).write_text(text)
     files = [str(tmp_path / "domain.pddl"), str(tmp_path / "problem.pddl")]
-    return CliRunner().invoke(app, ["plan", *files, *options])
+    return slap("plan", *files, *options)
 
 
 @pytest.mark.parametrize(

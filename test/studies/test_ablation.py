@@ -6,14 +6,13 @@ import json
 from dataclasses import fields
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.domains import domain_names, get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs
 from slap_ros.studies.slap import ablation
+from support.slap_command import slap
 
 PLAIN = "all of them (plain)"
 SMALL = ["--trainings", "1", "--steps", "4096", "--tasks", "1", "--samples", "2"]
@@ -49,9 +48,7 @@ def test_a_term_that_is_not_there():
 
 
 def study(output, domain, *more):
-    result = CliRunner().invoke(
-        app, ["study", "ablation", domain, "--output", str(output), *SMALL, *more]
-    )
+    result = slap("study", "ablation", domain, "--output", output, *SMALL, *more)
     return result.exit_code, " ".join(result.stderr.split())
 
 

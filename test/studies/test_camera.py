@@ -6,15 +6,14 @@ import json
 import sys
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import PlanningSetup
 from slap_ros.studies.slap.camera import SEEN, solve_by_camera
+from support.slap_command import slap
 
 pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")
@@ -25,9 +24,7 @@ SMALL += ["--first-seed", "1", "--samples", "1"]
 
 
 def study(output):
-    return CliRunner().invoke(
-        app, ["study", "camera", "obstacle_tower", "--output", str(output), *SMALL]
-    )
+    return slap("study", "camera", "obstacle_tower", "--output", output, *SMALL)
 
 
 @pytest.mark.parametrize("seed, code", [(318, ErrorCode.NO_DETECTION), (336, ErrorCode.NONE)])
