@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from slap_ros.geometry.oriented_box import UP, OrientedBox
-from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
+from slap_ros.geometry.pose import Pose, Vector, dot, multiply, normalised, rotate
 from slap_ros.relational import State
 from slap_ros.worlds.contact.links import link_poses, links
 from slap_ros.worlds.contact.scene import BoxPart, Compound, ContactScene, CylinderPart, Part
@@ -41,7 +41,7 @@ class Piece(NamedTuple):
     def extent(self, axis: Vector) -> float:
         """How far the piece reaches from its middle along a unit vector, m."""
         if isinstance(self.part, CylinderPart):
-            along = abs(_dot(axis, rotate(self.pose.quaternion, UP)))
+            along = abs(dot(axis, rotate(self.pose.quaternion, UP)))
             across = math.sqrt(max(0.0, 1.0 - along * along))
             return 0.5 * self.part.length_m * along + self.part.radius_m * across
         return OrientedBox(self.pose, self.part.half_extents_m).half_extent(axis)
@@ -207,7 +207,7 @@ def _overlap(first: Piece, second: Piece) -> Overlap:
     x, y, z = (p - q for p, q in zip(first.pose.position, second.pose.position, strict=True))
     upward = first.extent(UP) + second.extent(UP) - abs(z)
     found = [
-        (first.extent(axis) + second.extent(axis) - abs(_dot(axis, (x, y, z))), axis)
+        (first.extent(axis) + second.extent(axis) - abs(dot(axis, (x, y, z))), axis)
         for axis in _ways(first, second, (x, y, z))
     ]
     depth, (a, b, _) = min(found)
@@ -221,7 +221,3 @@ def _ways(first: Piece, second: Piece, offset: Vector) -> Iterable[Vector]:
     length = math.hypot(x, y)
     between = ((x / length, y / length, 0.0),) if length > APART else ((1.0, 0.0, 0.0),)
     return (*first.sideways(), *second.sideways(), *between)
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
