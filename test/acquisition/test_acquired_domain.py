@@ -12,10 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ensemble import encode
-from ensemble.client import RunClient
-from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.spinner import temporary_node
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.recording import Recording
 from slap_ros.domains import get_domain
@@ -36,6 +33,7 @@ from slap_ros.policies import shipped_models
 from slap_ros.report import read_report
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import SKILL
+from support.bench import solved_by
 from support.points import LOOSE, POINTS, PUT
 from support.slap_command import slap
 from support.steady_skills import PICKING, PUTTING, towards, write_library
@@ -303,20 +301,6 @@ def test_learned_skills_are_judged_beside_policies_that_see_nothing(library, tmp
     assert data["skills"]["name"] == "steady"
     assert [one["learned"]["rate"] for one in data["found"]["operators"]] == [1.0, 1.0]
     assert "| learned |" in (tmp_path / "vacuity_points.md").read_text()
-
-
-def solved_by(nodes):
-    """The result of an ensemble of these nodes, all in this process."""
-    with (
-        temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
-        InProcessLauncher(nodes, spinner.executor),
-    ):
-        assert spinner.spin_until(lambda: client.ready(recording=False), LIMIT_S)
-        sent = client.send((), 0, 5)
-        assert spinner.spin_until(sent.done, LIMIT_S)
-        ended = sent.result().get_result_async()
-        assert spinner.spin_until(ended.done, LIMIT_S)
-    return ended.result().result
 
 
 @pytest.mark.slow

@@ -14,12 +14,9 @@ pytest.importorskip("pybullet")  # Bullet is an extra: without it there is nothi
 from builtin_interfaces.msg import Time
 from visualization_msgs.msg import Marker
 
-from ensemble.client import RunClient
 from ensemble.encode import SCENE
-from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.run import RunRequest, run
-from ensemble.spinner import temporary_node
 from slap_ros.bags import bag_info, evaluate_bag, replay_bag
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import Recording
@@ -33,6 +30,7 @@ from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.worlds.panda import grasp_pose
+from support.bench import solved_by
 from support.slap_command import slap
 
 pytestmark = pytest.mark.timeout(180)  # runs in worlds with contact forces
@@ -129,16 +127,7 @@ def test_nodes_that_were_given_other_skills_refuse_each_other(network):
     nodes = {name: dict(given) for name, given in node_parameters(settings()).items()}
     # s, for it will see no state
     nodes["planner_node"] |= {"skills": "none", "observation_timeout": 2.0}
-    with (
-        temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
-        InProcessLauncher(nodes, spinner.executor),
-    ):
-        assert spinner.spin_until(lambda: client.ready(recording=False), LIMIT_S)
-        sent = client.send((), 0, 5)
-        assert spinner.spin_until(sent.done, LIMIT_S)
-        ended = sent.result().get_result_async()
-        assert spinner.spin_until(ended.done, LIMIT_S)
-    result = ended.result().result
+    result = solved_by(nodes)
     assert result.error_code == ErrorCode.SKILLS_CHANGED
     assert "skills demonstrator" in result.error_msg and "given none" in result.error_msg
 
@@ -147,16 +136,7 @@ def test_nodes_without_skills_of_their_own_take_those_that_are_announced(network
     nodes = {name: dict(given) for name, given in node_parameters(settings()).items()}
     for name in ("perception_node", "skill_server", "planner_node"):
         nodes[name] |= {"skills": "", "domain": ""}
-    with (
-        temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
-        InProcessLauncher(nodes, spinner.executor),
-    ):
-        assert spinner.spin_until(lambda: client.ready(recording=False), LIMIT_S)
-        sent = client.send((), 0, 5)
-        assert spinner.spin_until(sent.done, LIMIT_S)
-        ended = sent.result().get_result_async()
-        assert spinner.spin_until(ended.done, LIMIT_S)
-    assert ended.result().result.success
+    assert solved_by(nodes).success
 
 
 @pytest.mark.parametrize("world", ["robot", "mock"])
