@@ -38,6 +38,7 @@ from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
 from support.executed import executed, fluent_atoms
+from support.states import changed
 
 FAIR, PAPER = get_domain("cleanup_table"), get_domain("cleanup_table", "paper")
 PLACES = {"duck": (0.4, 0.1, 0.0), "toy_robot": (0.5, 0.2, 0.0), "dinosaur": (0.6, 0.1, 0.0)}
@@ -53,11 +54,6 @@ def solve(task, domain=FAIR):
 
 def atoms(state, domain=FAIR):
     return fluent_atoms(state, domain)
-
-
-def changed(state, name, **features):
-    block = state.layout.object(name)
-    return state.replace({(block, feature): value for feature, value in features.items()})
 
 
 def test_a_table_is_perceived_as_it_is_laid():

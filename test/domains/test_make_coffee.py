@@ -40,10 +40,10 @@ from support.drawer_states import (
     assert_metrics_agree,
     atoms,
     carry_out,
-    changed,
     constant_motions,
     put,
 )
+from support.states import changed
 
 DOMAIN = get_domain("make_coffee")
 SCRIPTED = open_domain(DomainChoice("make_coffee", skills="demonstrator"))

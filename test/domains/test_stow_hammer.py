@@ -24,10 +24,10 @@ from support.drawer_states import (
     assert_metrics_agree,
     atoms,
     carry_out,
-    changed,
     constant_motions,
     put,
 )
+from support.states import changed
 
 DOMAIN = get_domain("stow_hammer")
 SCRIPTED = open_domain(DomainChoice("stow_hammer", skills="demonstrator"))
