@@ -112,7 +112,7 @@ def plan_symbolically(
     if planner == "astar":
         from slap_ros.planning.least_cost import find_cheapest_plan
 
-        actions, is_cheapest = find_cheapest_plan(task).actions, True
+        actions, is_cheapest = find_cheapest_plan(task, effort).actions, True
     else:
         actions = find_plan(task, effort * MAX_EXPANSIONS, effort * MAX_TESTS)
         is_cheapest = not actions

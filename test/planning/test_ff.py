@@ -304,11 +304,19 @@ def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypa
     assert advice in result.stderr
 
 
-def test_more_effort_goes_further(tmp_path, monkeypatch):
-    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 1_000)
-    assert plan_files(tmp_path, hanoi(4)).exit_code == ErrorCode.PLANNING_LIMIT
-    result = plan_files(tmp_path, hanoi(4), "--effort", "100")
-    assert result.exit_code == 0
+@pytest.mark.parametrize(
+    ("planner", "limit"),
+    [
+        ("anytime", "slap_ros.cli.plan_pddl.MAX_TESTS"),
+        ("astar", "slap_ros.planning.least_cost.MAX_TESTS"),
+    ],
+)
+def test_more_effort_goes_further(tmp_path, monkeypatch, planner, limit):
+    monkeypatch.setattr(limit, 1_000)
+    chosen = ("--planner", planner)
+    assert plan_files(tmp_path, hanoi(4), *chosen).exit_code == ErrorCode.PLANNING_LIMIT
+    result = plan_files(tmp_path, hanoi(4), *chosen, "--effort", "100")
+    assert result.exit_code == 0, result.stderr
     assert "operators" in result.stderr
 
 
