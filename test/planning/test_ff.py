@@ -296,7 +296,7 @@ def plan_files(tmp_path, texts, *options):
     ids=["hanoi", "operator", "atoms"],
 )
 def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypatch, texts, advice):
-    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 400_000)  # else minutes
+    monkeypatch.setattr("slap_ros.planning.greedy.MAX_TESTS", 400_000)  # else minutes
     monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_BINDINGS", 20_000)
     monkeypatch.setattr("slap_ros.relational.pddl.grounder.MAX_ATOMS", 5_000)
     result = plan_files(tmp_path, texts)
@@ -307,7 +307,7 @@ def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("planner", "limit"),
     [
-        ("anytime", "slap_ros.cli.plan_pddl.MAX_TESTS"),
+        ("anytime", "slap_ros.planning.greedy.MAX_TESTS"),
         ("astar", "slap_ros.planning.least_cost.MAX_TESTS"),
     ],
 )
