@@ -73,7 +73,7 @@ def blocks_world(blocks: int, seed: int) -> Task:
     )
     space = problem.atom_space(BLOCKS_WORLD)
     operators = ground_operators(BLOCKS_WORLD.operators, space)
-    return problem.initial_mask(space), problem.goal_mask(space), list(operators)
+    return space.mask(problem.init), space.mask(problem.goal), list(operators)
 
 
 def operator(preconditions: int, add_effects: int, delete_effects: int) -> GroundOperator:
