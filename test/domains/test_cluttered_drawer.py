@@ -22,6 +22,8 @@ from slap_ros.domains.cluttered_drawer.tasks import (
 from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.errors import InvalidParameterError, InvalidStateError, SkillNotApplicableError
+from slap_ros.evaluation import experiment
+from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.geometry.pose import multiply, rotate
 from slap_ros.motion import linear_motion, nearest_configurations, retime
 from slap_ros.planning.abstract_graph import build_abstract_graph
@@ -34,8 +36,7 @@ from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Column, State, Target
 from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import MAX_STEP, grasp_pose
-from support.executed import executed, fluent_atoms
-from support.states import changed
+from support.states import changed, fluent_atoms
 
 FAIR, PAPER = get_domain("cluttered_drawer"), get_domain("cluttered_drawer", "paper")
 HALF = 0.025  # m, half a block
@@ -45,7 +46,7 @@ LEFT_BLOCKER = (MIDDLE, NEIGHBOUR, 0.0)
 
 
 def solve(task, domain=FAIR):
-    return executed(task, domain)
+    return experiment.solve(domain, task, PURE_PLANNING)
 
 
 def atoms(state, domain=FAIR):
