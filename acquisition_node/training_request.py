@@ -36,7 +36,7 @@ class TrainingRequest:
     rewarder: str
     steps: int
     seed: int
-    kept: Path | None = None
+    kept: Path | None
 
     def arguments(self, parameters: AcquisitionParameters) -> list[str]:
         """The arguments of ``slap acquire``, the library's folder last.

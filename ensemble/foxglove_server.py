@@ -41,7 +41,7 @@ class FoxgloveServer:
         InvalidParameterError: foxglove-sdk is not installed, or the port is in use.
     """
 
-    def __init__(self, port: int | None = None) -> None:
+    def __init__(self, port: int | None) -> None:
         """Serve on ``port``; None: Foxglove's own port, or any other that is free."""
         if not foxglove_installed():
             raise InvalidParameterError(

@@ -305,5 +305,4 @@ def parse_robot_bridge(text: str) -> dict[str, str | int | float | tuple[float, 
     Raises:
         InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
-    given = GIVEN_WITH_THE_RUN | {"scene"}
-    return parse_parameters(text, RobotBridgeParameters, "robot", given)
+    return parse_parameters(text, RobotBridgeParameters, "robot", GIVEN_WITH_THE_RUN)

@@ -109,6 +109,16 @@ def module_network():
         yield number
 
 
+@pytest.fixture(scope="session")
+def script():
+    """A run of one episode of Obstacle 2D. Shared: not to be changed."""
+    from support.truthful_run import Script  # imports the core, which most tests do not need here
+
+    script = Script(seed=7)
+    script.run()
+    return script
+
+
 @contextmanager
 def _domain():
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:

@@ -8,6 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 
 import pytest
 
+from slap_ros.domains.registry import OURS
 from tools.imports import ABOVE_THE_CORE, ROOT, all_imports
 
 LONGEST = 60  # lines of a function, its docstring among them
@@ -48,6 +49,16 @@ FLOORS = (
         "slap_ros",
     ),
 )
+LEARNERS = {"acquisition", "baselines", "imitation", "learning", "shortcuts"}
+ALONE = {
+    "torch": LEARNERS,
+    "stable_baselines3": LEARNERS,
+    "gymnasium": {"environments", *LEARNERS},
+    "matplotlib": {"studies"},
+    "numba": {"compilation"},
+    "rich": {"cli", "ensemble"},
+    "typer": {"cli", "ensemble"},
+}
 ORDER = [package for floor in FLOORS for package in floor]
 ROS = re.compile(r"rclpy|embedded_ros|cyclonedds|launch(_ros)?|rosidl_.*|\w+_(msgs|interfaces)$")
 
@@ -96,30 +107,44 @@ def test_who_never_imports_whom(imports):
     assert asking <= {"relational", "files", "redaction", "errors"}
 
 
+def across(package, rooms):
+    """Which files of a package import one of its rooms and lie in none or in another."""
+    home = ROOT / "slap_ros" / package
+    return [
+        (path.relative_to(home).as_posix(), room)
+        for path in sorted(home.rglob("*.py"))
+        for room in rooms
+        if path.relative_to(home).parts[0] != room
+        and re.search(
+            rf"from slap_ros\.{package}(\.| import .*\b){room}\b", path.read_text(encoding="utf-8")
+        )
+    ]
+
+
+@pytest.mark.parametrize(
+    ("package", "rooms"), [("worlds", ("joint_space", "contact")), ("domains", OURS)]
+)
+def test_worlds_and_domains_do_not_know_one_another(package, rooms):
+    """Each imports what all share; what they share imports none of them."""
+    assert not across(package, rooms)
+
+
 def test_proposals_and_training_do_not_know_one_another():
     """The curriculum imports both, and neither of them imports it."""
-    room = ROOT / "slap_ros" / "acquisition"
-    across = [
-        f"{path.relative_to(ROOT)} imports {other}"
-        for own in ("proposals", "training")
-        for path in sorted((room / own).rglob("*.py"))
-        for other in {"proposals", "training", "curriculum"} - {own}
-        if f"from slap_ros.acquisition.{other}" in path.read_text(encoding="utf-8")
-    ]
-    assert not across, "\n".join(across)
+    found = across("acquisition", ("proposals", "training", "curriculum"))
+    assert {path.partition("/")[0] for path, _ in found} == {"curriculum"}
 
 
-def test_worlds_do_not_know_one_another():
-    """Each world imports what all share; what they share imports none of them."""
-    room = ROOT / "slap_ros" / "worlds"
-    across = [
-        f"{path.relative_to(ROOT)} imports {world}"
-        for path in sorted(room.rglob("*.py"))
-        for world in ("joint_space", "contact")
-        if path.relative_to(room).parts[0] != world
-        and f"from slap_ros.worlds.{world}" in path.read_text(encoding="utf-8")
-    ]
-    assert not across, "\n".join(across)
+def test_the_figures_of_one_paper_need_none_of_the_other():
+    rooms = ("slap", "lg_sail")
+    assert not [found for found in across("studies", rooms) if found[0].startswith(rooms)]
+
+
+@pytest.mark.parametrize(("library", "packages"), ALONE.items())
+def test_only_these_import_what_is_slow_to_import_or_an_extra(imports, library, packages):
+    """So acquired skills and shortcuts run without torch, and the core without a terminal."""
+    others = {i.importer for i in imports if i.imported == library} - packages
+    assert not others
 
 
 def test_nothing_that_is_read_is_executed():

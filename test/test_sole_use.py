@@ -8,13 +8,12 @@ import sys
 from contextlib import contextmanager
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.errors import BusyError, ErrorCode
 from slap_ros.files import sole_use
 from slap_ros.studies.results import Provenance
 from slap_ros.studies.study_log import StudyLog
+from support.slap_command import slap
 
 ORIGIN = Provenance("obstacle2d", "slap study goals obstacle2d", {})
 WORKS = """
@@ -43,7 +42,7 @@ def test_a_work_folder_is_for_one_process_until_that_ends_however_it_ends(tmp_pa
     work, library = tmp_path / "work", tmp_path / "library"
     with another_process_in(work):
         given = [*command.split(), "--work", str(work), "--output", str(library)]
-        result = CliRunner().invoke(app, given)
+        result = slap(*given)
         assert result.exit_code == ErrorCode.BUSY
         complaint = " ".join(result.stderr.split())
         assert f"another process is at work on {work}: wait until it has ended" in complaint

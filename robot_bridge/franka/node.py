@@ -145,7 +145,7 @@ class FrankaDriver(Node):
             self._simulation.close()
             raise
         self._objects = ModelledObjects(domain, initial, self._arm)
-        noise = NoiseModel.of(settings)
+        noise = NoiseModel(settings)
         self._detections = DetectionPublisher(self, self._objects, noise, settings)
         create_timer(self, domain.execution.control_period_s, self._objects.follow)
 

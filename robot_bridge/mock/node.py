@@ -76,7 +76,7 @@ class MockRobot(Node):
             raise InvalidParameterError("parameters rate, joint_rate and pace must be above 0")
         domain = open_domain(settings.choice)
         period_s = domain.execution.control_period_s / settings.pace
-        noise = NoiseModel.of(settings)
+        noise = NoiseModel(settings)
         self._plant = Plant(domain, settings.first_task(domain).initial_state)
         self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0)
         self._controllers = MockControllers(

@@ -93,7 +93,7 @@ class MujocoRobot(Node):
         """
         super().__init__("mujoco_robot", **kwargs)
         settings = read_parameters(self, MujocoRobotParameters)
-        noise = NoiseModel.of(settings)
+        noise = NoiseModel(settings)
         domain = open_domain(settings.choice)
         initial = settings.first_task(domain).initial_state
         self._camera: CameraPublisher | None = None

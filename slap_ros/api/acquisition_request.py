@@ -109,11 +109,11 @@ class AcquisitionRequest:
             seed=self.seed,
             **self.proposers.given,
             rewarder=self.rewarder,
-            **{"from": [_shareable(folder) for folder in self.begin_with]},
+            **{"from": [shareable(folder) for folder in self.begin_with]},
             encoder=self.encoder,
-            keep=_shareable(self.keep) if self.keep else None,
+            keep=shareable(self.keep) if self.keep else None,
             revise=self.revise or None,
-            shortcuts=_shareable(self.shortcuts) if self.shortcuts else None,
+            shortcuts=shareable(self.shortcuts) if self.shortcuts else None,
             settings=self.settings,
             steps=self.steps,
             set=list(self.changes) or None,
@@ -172,6 +172,6 @@ class AcquisitionRequest:
         return LibraryChoice(self.shortcuts.resolve(), library.digest)
 
 
-def _shareable(folder: Path) -> str:
-    """A folder as it was given, or its name alone: no path of this machine goes into a library."""
+def shareable(folder: Path) -> str:
+    """A folder as it was given, or its name alone: no path of this machine goes into a record."""
     return folder.name if folder.is_absolute() else folder.as_posix()

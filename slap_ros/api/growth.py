@@ -11,7 +11,7 @@ from typing import Any
 
 from slap_ros.acquisition.curriculum.jobs import horizon_of
 from slap_ros.acquisition.proposals.proposer_names import MANUAL
-from slap_ros.api.acquisition_request import AcquisitionRequest
+from slap_ros.api.acquisition_request import AcquisitionRequest, shareable
 from slap_ros.api.command_line import command_line
 from slap_ros.api.proposers import Proposers
 from slap_ros.api.training import chosen_settings
@@ -251,8 +251,8 @@ class GrowthRequest:
             seed=self.seed,
             **self.proposers.given,
             rewarder=self.rewarder,
-            **{"from": [_named(folder) for folder in self.begin_with]},
-            keep=_named(self.keep) if self.keep else None,
+            **{"from": [shareable(folder) for folder in self.begin_with]},
+            keep=shareable(self.keep) if self.keep else None,
             skill_settings=self.skill_settings,
             set_skills=list(self.skill_changes) or None,
             settings=self.shortcut_settings,
@@ -288,8 +288,3 @@ def _no_more(left: int, given: int) -> int:
         given: Environment steps that were given; 0 for no limit.
     """
     return max(1, min(left, given) if given else left)
-
-
-def _named(folder: Path) -> str:
-    """A folder as it was given, or its name alone: no path of this machine goes into a result."""
-    return folder.name if folder.is_absolute() else folder.as_posix()

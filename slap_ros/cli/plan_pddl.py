@@ -10,7 +10,7 @@ from pathlib import Path
 from slap_ros.cli.console import console, print_json
 from slap_ros.errors import InvalidParameterError, PlanningLimitError
 from slap_ros.files import read_bytes
-from slap_ros.planning.greedy import MAX_EXPANSIONS, MAX_TESTS, find_plan
+from slap_ros.planning.greedy import find_plan
 from slap_ros.relational.pddl import PddlDomain, PddlProblem, parse_domain, parse_problem
 from slap_ros.relational.pddl.grounder import MAX_BINDINGS, ground_task
 from slap_ros.relational.pddl.tokens import decode
@@ -112,9 +112,9 @@ def plan_symbolically(
     if planner == "astar":
         from slap_ros.planning.least_cost import find_cheapest_plan
 
-        actions, is_cheapest = find_cheapest_plan(task).actions, True
+        actions, is_cheapest = find_cheapest_plan(task, effort).actions, True
     else:
-        actions = find_plan(task, effort * MAX_EXPANSIONS, effort * MAX_TESTS)
+        actions = find_plan(task, effort)
         is_cheapest = not actions
         if problem.minimises_cost and planner != "ff":
             from slap_ros.planning.least_cost import make_cheaper

@@ -24,7 +24,7 @@ from slap_ros.drawing.projection import (
     box_paths,
     pose_of,
 )
-from slap_ros.geometry.pose import Vector, conjugate, rotate
+from slap_ros.geometry.pose import Vector, conjugate, dot, rotate
 
 BLUNT = 0.8  # cosine between the normals of triangles of one face, at least
 LEAST_AREA = 1e-12  # m²: thinner triangles are not drawn
@@ -58,9 +58,9 @@ def body_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str
     toward, light = rotate(back, view.toward), rotate(back, LIGHT)
     paths = ["", "", ""]
     for face in _faces(body.triangles):
-        seen = [triangle for triangle in face if _dot(triangle.normal, toward) > EDGE_ON]
-        lit = [triangle for triangle in seen if _dot(triangle.normal, light) > LIT]
-        shaded = [triangle for triangle in seen if _dot(triangle.normal, light) < SHADED]
+        seen = [triangle for triangle in face if dot(triangle.normal, toward) > EDGE_ON]
+        lit = [triangle for triangle in seen if dot(triangle.normal, light) > LIT]
+        shaded = [triangle for triangle in seen if dot(triangle.normal, light) < SHADED]
         for number, part in enumerate((seen, lit, shaded)):
             for outline in _outlines(part):
                 paths[number] += canvas.path(view.project(pose.apply(p)) for p in outline)
@@ -85,7 +85,7 @@ def _faces(corners: tuple[Vector, ...]) -> tuple[Face, ...]:
             face.append(triangle)
             for a, b in _edges(triangle):
                 for i in by_edge[b, a]:
-                    if i in left and _dot(triangles[i].normal, triangle.normal) > BLUNT:
+                    if i in left and dot(triangles[i].normal, triangle.normal) > BLUNT:
                         left.remove(i)
                         queue.append(i)
         faces.append(tuple(face))
@@ -129,7 +129,3 @@ def _outlines(part: Iterable[Triangle]) -> Iterator[list[Vector]]:
             if point == start:
                 break
         yield line
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

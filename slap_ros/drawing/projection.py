@@ -13,7 +13,7 @@ from itertools import product
 from math import cos, hypot, radians, sin
 
 from slap_ros.core import VisibleBody
-from slap_ros.geometry.pose import Pose, Vector, rotate
+from slap_ros.geometry.pose import Pose, Vector, dot, rotate
 
 UNITS = 1000  # width of a drawing; whole units are fine enough on any screen
 EDGE_ON = 1e-6  # cosine at which a face can no longer be seen
@@ -43,11 +43,11 @@ class Projection:
 
     def project(self, point: Vector) -> Point:
         """Where a point of the world is seen."""
-        return _dot(self.right, point), _dot(self.up, point)
+        return dot(self.right, point), dot(self.up, point)
 
     def depth(self, point: Vector) -> float:
         """How near to the viewer a point is, m."""
-        return _dot(self.toward, point)
+        return dot(self.toward, point)
 
 
 def _oblique(turn: float, height: float) -> Projection:
@@ -170,9 +170,9 @@ def _seen(body: VisibleBody, view: Projection) -> Iterator[Face]:
     half = [size / 2 for size in body.size]
     for axis, sign in product(range(3), (-1.0, 1.0)):
         normal = rotate(pose.quaternion, _scaled(AXES[axis], sign))
-        if _dot(normal, toward) > EDGE_ON:
+        if dot(normal, toward) > EDGE_ON:
             local = _face(half, axis, sign)
-            yield _dot(normal, LIGHT), [pose.apply(corner) for corner in local]
+            yield dot(normal, LIGHT), [pose.apply(corner) for corner in local]
 
 
 def pose_of(body: VisibleBody) -> Pose:
@@ -180,10 +180,6 @@ def pose_of(body: VisibleBody) -> Pose:
     length = hypot(*body.quaternion)  # colours and poses of markers are what someone recorded
     x, y, z, w = (part / length for part in body.quaternion)
     return Pose(body.position, (x, y, z, w))
-
-
-def _dot(a: Sequence[float], b: Sequence[float]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _scaled(v: Vector, factor: float) -> Vector:

@@ -12,7 +12,7 @@ from typing import Any
 from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
-from slap_ros.learning.workers import Workers, local_workers
+from slap_ros.learning.workers import Workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.relational import GroundAtom
 from slap_ros.skills.domain_choice import SHIPPED, DomainChoice, open_domain
@@ -195,29 +195,12 @@ class Trial:
         return {**data, "edges": edges}
 
 
-def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[Trial]:
+def run_with(workers: Workers, experiment: Experiment, approach: Approach) -> Iterator[Trial]:
     """Solve every task of an experiment.
 
-    Every approach has processes of its own: what motion planning has cached of the same task under
-    another approach would make planning look faster than it is.
-
     Args:
-        experiment: Experiment whose tasks are solved.
-        approach: Approach to planning.
-        jobs: Number of tasks solved at a time, in as many processes.
-
-    Yields:
-        The figures of each task, as it ends.
-    """
-    with local_workers(jobs) as workers:
-        yield from run_with(workers, experiment, approach)
-
-
-def run_with(workers: Workers, experiment: Experiment, approach: Approach) -> Iterator[Trial]:
-    """Solve every task of an experiment; see :func:`run_all`.
-
-    Args:
-        workers: Workers that solve the tasks.
+        workers: Workers that solve the tasks, and nothing under another approach: what motion
+            planning has cached of the same task would make planning look faster than it is.
         experiment: Experiment whose tasks are solved.
         approach: Approach to planning.
 

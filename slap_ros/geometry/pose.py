@@ -61,6 +61,11 @@ def rotation_matrix(q: Quaternion) -> tuple[Vector, Vector, Vector]:
     )
 
 
+def dot(a: Vector, b: Vector) -> float:
+    """The inner product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def rotate(q: Quaternion, v: Vector) -> Vector:
     """The vector turned by the quaternion."""
     x, y, z, w = q

@@ -10,7 +10,7 @@ times is answered in the order of the recording. Nothing in it is secret: keys a
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -136,15 +136,12 @@ class OffClient:
 class RecordingClient:
     """Asks another client, and writes down each exchange as soon as it is there."""
 
-    def __init__(
-        self, client: Client, path: Path, now: Callable[[], datetime] = lambda: datetime.now(UTC)
-    ) -> None:
+    def __init__(self, client: Client, path: Path) -> None:
         """Record to a file that does not exist yet.
 
         Args:
             client: Whoever answers.
             path: The cassette.
-            now: The clock, for the header.
 
         Raises:
             InvalidCassetteError: It exists.
@@ -157,7 +154,7 @@ class RecordingClient:
             "format": FORMAT,
             "version": VERSION,
             "source": client.source,
-            "recorded": now().isoformat(timespec="seconds"),
+            "recorded": datetime.now(UTC).isoformat(timespec="seconds"),
         }
         self._write(header, "x")
 

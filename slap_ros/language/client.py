@@ -60,17 +60,13 @@ class OpenAIClient:
     """Asks a server; again, after growing pauses, where it is busy or gone."""
 
     def __init__(
-        self,
-        settings: LanguageSettings,
-        environment: Mapping[str, str] | None = None,
-        sleep: Callable[[float], None] = time.sleep,
+        self, settings: LanguageSettings, environment: Mapping[str, str] | None = None
     ) -> None:
         """Prepare to ask; nothing is sent yet.
 
         Args:
             settings: Which model, where, how.
             environment: Where the key is; the process's own if left out.
-            sleep: How to pause, s.
 
         Raises:
             LanguageUnavailableError: No model is named, no key is there where one must be, no
@@ -86,7 +82,6 @@ class OpenAIClient:
         self._settings = settings
         self._secrets = secret_forms(key)
         self._route = described_route(settings.base_url)
-        self._sleep = sleep
         self._degree = settings.degree
         self._client = open_client(self._openai, settings.base_url, key or NO_KEY)
 
@@ -209,7 +204,7 @@ class OpenAIClient:
                 + (f", and it asked for {pause:.0f} s" if failure.retry_after else "")
             )
         logger.info("%s: %s; asking again in %.1f s", self.source, failure.words, pause)
-        self._sleep(pause)
+        time.sleep(pause)
 
     def _try(
         self,

@@ -39,14 +39,7 @@ def shifted(pose: Pose, displacement: tuple[float, float, float]) -> Pose:
     return Pose((x, y, z), pose.quaternion)
 
 
-def linear_motion(
-    q: Joints,
-    target: Pose,
-    *,
-    free: Free | None = None,
-    increment: float = INCREMENT,
-    resolution: float = RESOLUTION,
-) -> Path | None:
+def linear_motion(q: Joints, target: Pose, *, free: Free | None = None) -> Path | None:
     """The path on which the grasp point goes straight to a pose, turning evenly.
 
     Every increment continues from the one before along the Jacobian, by the fewest control steps,
@@ -56,8 +49,6 @@ def linear_motion(
         q: Configuration to start from, rad, shape (7,).
         target: Pose of the grasp point in the base's frame.
         free: Checker of which configurations are free of collisions; None: all are.
-        increment: Distance between rows, m; less where joints move fast.
-        resolution: Control steps between checked configurations.
 
     Returns:
         rad, shape (k, 7), beginning with ``q``; None if it would leave the joint limits, come to a
@@ -65,10 +56,10 @@ def linear_motion(
     """
     q = configuration(q)
     start = grasp_pose(q)
-    parts = (math.dist(start.position, target.position) / increment, _angle(start, target))
+    parts = (math.dist(start.position, target.position) / INCREMENT, _angle(start, target))
     count = max(1, math.ceil(max(parts) - 1e-9))
     rows = backend().linear_rows(q, start, target, count)
-    if rows is None or (free is not None and not free_space(free).path_is_free(rows, resolution)):
+    if rows is None or (free is not None and not free_space(free).path_is_free(rows, RESOLUTION)):
         return None
     return rows
 

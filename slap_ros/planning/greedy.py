@@ -26,28 +26,25 @@ MAX_TESTS = 10_000_000_000  # of operators, once per round of the heuristic; som
 BOOST = 1000  # expansions of successors by helpful actions after progress
 
 
-def find_plan(
-    task: GroundTask, max_expansions: int = MAX_EXPANSIONS, max_tests: int = MAX_TESTS
-) -> list[int]:
+def find_plan(task: GroundTask, effort: int = 1) -> list[int]:
     """A plan for a ground task, which need be neither the shortest nor the cheapest.
 
     The same arguments give the same plan.
 
     Args:
         task: Task to be solved.
-        max_expansions: States to expand before giving up.
-        max_tests: Operators for the heuristic to look at, once per round, before giving up.
+        effort: Factor of the limits of the search.
 
     Returns:
         Indices of actions; none where the goal holds already.
 
     Raises:
         UnsolvableError: There is no plan.
-        PlanningLimitError: None was found within ``max_expansions`` and ``max_tests``.
+        PlanningLimitError: None was found within the limits.
     """
     if task.start & task.goal == task.goal:
         return []
-    return _Search(task, max_expansions, max_tests).run()
+    return _Search(task, effort * MAX_EXPANSIONS, effort * MAX_TESTS).run()
 
 
 @dataclass(order=True)

@@ -51,21 +51,19 @@ def cost_of(task: GroundTask, actions: list[int]) -> float:
     return sum(task.actions[index].cost for index in actions)
 
 
-def find_cheapest_plan(
-    task: GroundTask, max_states: int = MAX_STATES, max_tests: int = MAX_TESTS
-) -> CostlyPlan:
+def find_cheapest_plan(task: GroundTask, effort: int = 1) -> CostlyPlan:
     """A plan than which none costs less.
 
     Args:
         task: Task to be solved.
-        max_states: States to evaluate before giving up.
-        max_tests: Operators for the heuristic to look at before giving up.
+        effort: Factor of the limits of the search.
 
     Raises:
         UnsolvableError: There is no plan.
         PlanningLimitError: None was found within the limits.
     """
-    search = _CostSearch(task, *_h_max(task), 1.0, (max_states, max_tests))
+    limits = effort * MAX_STATES, effort * MAX_TESTS
+    search = _CostSearch(task, *_h_max(task), 1.0, limits)
     if search.heuristic_of(task.start) is None:
         raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")
     plan = search.run(np.inf)

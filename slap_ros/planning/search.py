@@ -36,7 +36,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import count
 
-from slap_ros.errors import UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.failures import Failures
 from slap_ros.planning.model import Model, Rollout
@@ -113,16 +112,6 @@ class SearchOutcome:
     reason: str = ""
     at_least: int | None = None
     stopped: bool = False
-
-    def require_plan(self) -> Plan:
-        """The plan, where there has to be one.
-
-        Raises:
-            UnsolvableError: There is none.
-        """
-        if self.plan is None:
-            raise UnsolvableError(self.reason)
-        return self.plan
 
 
 @dataclass

@@ -24,9 +24,11 @@ from slap_ros.portable_math import RESOLUTION
 
 Values = NDArray[np.float64]
 MANTISSA_BITS = 53  # bits of a 64-bit float's mantissa
-# Largest number of rows of a product. OpenBLAS spreads larger ones over threads, which wait for one
-# another where cores are busy.
-MAX_ROWS = 64
+# Largest product, in multiplications, that OpenBLAS leaves to one thread. Threads wait for one
+# another where cores are busy: there, 64 rows took up to a hundred times as long as twice 32 rows.
+LARGEST_PRODUCT = 2**18
+MAX_ROWS = 64  # of a product
+LEAST_ROWS = 16  # fewer take longer than threads do
 PARTS = 2  # parts of the weights: with two, the sums are as good as those of 64-bit floats
 
 
@@ -80,10 +82,16 @@ class ExactLayer:
         Args:
             inputs: Inputs, multiples of ``RESOLUTION`` within the bound, shape (n, in).
         """
-        sums = np.empty((len(inputs), 2 * len(self.bias)))
-        for i in range(0, len(inputs), MAX_ROWS):
-            np.matmul(inputs[i : i + MAX_ROWS], self._side_by_side, out=sums[i : i + MAX_ROWS])
+        sums, rows = np.empty((len(inputs), 2 * len(self.bias))), self._rows
+        for i in range(0, len(inputs), rows):
+            np.matmul(inputs[i : i + rows], self._side_by_side, out=sums[i : i + rows])
         return sums
+
+    @cached_property
+    def _rows(self) -> int:
+        """Number of rows of a product: as many as one thread multiplies, where those are enough."""
+        rows = min(MAX_ROWS, LARGEST_PRODUCT // self._side_by_side.size)
+        return rows if rows >= LEAST_ROWS else MAX_ROWS
 
     @cached_property
     def _side_by_side(self) -> Values:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from statistics import fmean
-from typing import cast
+from typing import NamedTuple, cast
 
 from slap_ros.messages.events import AcquisitionEventKind
 from slap_ros.messages.protocols import (
@@ -27,6 +27,14 @@ ENDS = {
 }
 
 
+class FailureCount(NamedTuple):
+    """How often an operator failed, and the commonest reason."""
+
+    operator: str
+    times: int
+    reason: str
+
+
 @dataclass(frozen=True)
 class RecordedIteration:
     """Plans that were carried out with the skills at hand.
@@ -35,13 +43,13 @@ class RecordedIteration:
         number: Number of the iteration, from 0.
         progress: Mean share of a plan that was done, 0 to 1.
         rollouts: Plans that were carried out.
-        failures: Operators that failed, each with how often and the commonest reason.
+        failures: Operators that failed.
     """
 
     number: int
     progress: float
     rollouts: int
-    failures: tuple[tuple[str, int, str], ...]
+    failures: tuple[FailureCount, ...]
 
 
 @dataclass(frozen=True)
@@ -179,7 +187,7 @@ def _iteration(number: int, rollouts: Sequence[LearningEventMessage]) -> Recorde
     failures = []
     for operator, count in failed.most_common():
         reasons = Counter(_reason(e) for e in rollouts if e.subject == operator)
-        failures.append((operator, count, reasons.most_common(1)[0][0]))
+        failures.append(FailureCount(operator, count, reasons.most_common(1)[0][0]))
     progress = fmean(_share(event.progress) for event in rollouts)
     return RecordedIteration(number, progress, len(rollouts), tuple(failures))
 

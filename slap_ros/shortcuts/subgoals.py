@@ -18,7 +18,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.hindsight_vec_env import HindsightEnvSpec
-from slap_ros.shortcuts.jobs import LearningAttempt, learn_stages
+from slap_ros.shortcuts.learning_attempt import LearningAttempt, learn_stages
 from slap_ros.shortcuts.progress import ProgressRecorder, SavableLearner
 from slap_ros.shortcuts.settings import TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -75,10 +75,10 @@ class SubgoalAttempt:
         return ShortcutWorkFolder(Path(self.folder))
 
     def shown(self) -> None:
-        """No demonstrations; see :class:`~slap_ros.shortcuts.jobs.StagedAttempt`."""
+        """None: there are no demonstrations."""
 
     def plan_lengths(self, learner: SavableLearner) -> None:
-        """No rule ends learning early; see :class:`~slap_ros.shortcuts.jobs.StagedAttempt`."""
+        """None: no rule ends learning early."""
         del learner
 
     def parts(self, stage: int) -> list[SubgoalEnvSpec]:

@@ -27,6 +27,12 @@ from slap_ros.shortcuts.demonstrations import ShortcutDemonstration
 from slap_ros.shortcuts.exploration_policies import RANDOM
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
+from slap_ros.shortcuts.learning_attempt import (
+    LearningAttempt,
+    StagedAttempt,
+    learn,
+    learn_first_stage,
+)
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -440,16 +446,16 @@ class Training:
     ) -> Shortcut:
         """Learn a shortcut in the most successful of as many attempts as it takes."""
         if self.settings.attempts == 1:
-            return self._run_attempt(jobs.learn, self._attempt(signature, starts, 0, shown))
+            return self._run_attempt(learn, self._attempt(signature, starts, 0, shown))
         first_stages: list[Progress] = []
         while len(first_stages) < self.settings.attempts:
             attempt = self._attempt(signature, starts, len(first_stages), shown)
-            first_stages.append(self._run_attempt(jobs.learn_first_stage, attempt))
+            first_stages.append(self._run_attempt(learn_first_stage, attempt))
             if first_stages[-1].success >= ENOUGH_SUCCESS:
                 break
         success = [stage.success for stage in first_stages]
         best = success.index(max(success))
-        shortcut = self._run_attempt(jobs.learn, self._attempt(signature, starts, best, shown))
+        shortcut = self._run_attempt(learn, self._attempt(signature, starts, best, shown))
         in_vain = sum(stage.steps for i, stage in enumerate(first_stages) if i != best)
         steps = int(shortcut.record["environment_steps"]) + in_vain
         record = {**shortcut.record, "environment_steps": steps, "attempts": len(success)}
@@ -461,7 +467,7 @@ class Training:
         starts: tuple[StartRecord, ...],
         number: int,
         shown: tuple[ShortcutDemonstration, ...],
-    ) -> jobs.LearningAttempt:
+    ) -> LearningAttempt:
         """An attempt to learn a shortcut.
 
         Args:
@@ -471,7 +477,7 @@ class Training:
             shown: Demonstrations of the shortcut.
         """
         folder = attempt_folder(self.folder, signature.name, number)
-        return jobs.LearningAttempt(
+        return LearningAttempt(
             self.distribution,
             signature,
             starts,
@@ -484,12 +490,12 @@ class Training:
         )
 
     def _run_attempt(
-        self, learn: Callable[[Any, int], Result], attempt: jobs.StagedAttempt
+        self, function: Callable[[Any, int], Result], attempt: StagedAttempt
     ) -> Result:
         """The result of a job that learns in an attempt."""
         steps = attempt.settings.total_steps
         self.callback.on_learning(attempt.name, Path(attempt.folder), steps)
-        ((_, result),) = self.workers.run(learn, [(attempt, self.workers.processes)])
+        ((_, result),) = self.workers.run(function, [(attempt, self.workers.processes)])
         return result
 
     def _plan_length(self, shortcuts: tuple[Shortcut, ...]) -> float:

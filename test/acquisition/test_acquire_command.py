@@ -7,15 +7,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from typer.testing import CliRunner
 
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
-from slap_ros.cli import app
 from slap_ros.cli.acquire import why_left
 from slap_ros.errors import ErrorCode
 from support.model_answers import good_script
 from support.points import PICK, POINTS, PUT
 from support.scripted_server import serving
+from support.slap_command import slap
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SMALL = [
@@ -24,11 +23,6 @@ SMALL = [
 ]  # fmt: skip
 SHORTCUTS = str(Path(__file__).parents[2] / "models" / "shortcuts" / "obstacle2d")
 BUDGET = [*(word for change in SMALL for word in ("--set", change)), "--steps", 200, "--jobs", 1]
-
-
-def slap(*arguments):
-    """In this process, so that torch is imported once for all of these tests."""
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.mark.slow

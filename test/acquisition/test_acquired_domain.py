@@ -10,14 +10,9 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 from ensemble import encode
-from ensemble.cli.application import app
-from ensemble.client import RunClient
-from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.spinner import temporary_node
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.recording import Recording
 from slap_ros.domains import get_domain
@@ -29,7 +24,8 @@ from slap_ros.errors import (
     UnsolvableError,
 )
 from slap_ros.evaluation.approaches import PURE_PLANNING
-from slap_ros.evaluation.experiment import Experiment, run_all, solve
+from slap_ros.evaluation.experiment import Experiment, run_with, solve
+from slap_ros.learning.workers import local_workers
 from slap_ros.messages.decode import decode_target
 from slap_ros.messages.interfaces import PLAN
 from slap_ros.planning.planner import PLANNERS, make_planner
@@ -38,7 +34,9 @@ from slap_ros.policies import shipped_models
 from slap_ros.report import read_report
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import SKILL
+from support.bench import solved_by
 from support.points import LOOSE, POINTS, PUT
+from support.slap_command import slap
 from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 SHARED = HealthCheck.function_scoped_fixture  # the library, which nothing changes
@@ -46,10 +44,6 @@ LIMIT_S = 120.0  # far more than anything here takes
 pytestmark = pytest.mark.usefixtures("points_installed")
 SOON = {"observation_timeout": 2.0}  # s, for a planner that will see no state
 IN_PROCESS = ("--in-process", "--patience", "10")  # for a loaded machine
-
-
-def slap(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def said(ran):
@@ -112,11 +106,12 @@ def test_evaluation_records_the_library_and_is_the_same_in_other_processes(libra
     digest = domain.configuration["skills_digest"]
     assert recorded == {"name": "steady", "digest": digest, "skills": ["Pick", "Put"]}
     experiment = Experiment(domain, 2, 1, skills=str(library))
-    (one, *_), (other, *_) = (
-        sorted((trial.index, trial.plan_length) for trial in run_all(experiment, PURE_PLANNING, n))
-        for n in (1, 2)
-    )
-    assert one == other
+    lengths = []
+    for jobs in (1, 2):
+        with local_workers(jobs) as workers:
+            trials = run_with(workers, experiment, PURE_PLANNING)
+            lengths.append(sorted((trial.index, trial.plan_length) for trial in trials))
+    assert lengths[0] == lengths[1]
 
 
 def test_a_bag_names_the_library_and_is_read_without_it(network, library, tmp_path):
@@ -308,20 +303,6 @@ def test_learned_skills_are_judged_beside_policies_that_see_nothing(library, tmp
     assert data["skills"]["name"] == "steady"
     assert [one["learned"]["rate"] for one in data["found"]["operators"]] == [1.0, 1.0]
     assert "| learned |" in (tmp_path / "vacuity_points.md").read_text()
-
-
-def solved_by(nodes):
-    """The result of an ensemble of these nodes, all in this process."""
-    with (
-        temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
-        InProcessLauncher(nodes, spinner.executor),
-    ):
-        assert spinner.spin_until(lambda: client.ready(recording=False), LIMIT_S)
-        sent = client.send((), 0, 5)
-        assert spinner.spin_until(sent.done, LIMIT_S)
-        ended = sent.result().get_result_async()
-        assert spinner.spin_until(ended.done, LIMIT_S)
-    return ended.result().result
 
 
 @pytest.mark.slow

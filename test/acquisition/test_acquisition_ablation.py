@@ -6,9 +6,7 @@ import json
 from dataclasses import asdict
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.acquisition.curriculum.solved_shares import Point
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.api.learning_curves import PLAN
@@ -16,6 +14,7 @@ from slap_ros.learning.task_distribution import TRAINING_SEED
 from slap_ros.skills.skill import approach_of
 from slap_ros.studies.lg_sail import acquisition_ablation as ablation
 from slap_ros.studies.lg_sail.learning_curves import AcquisitionSetup, LearningCurves
+from support.slap_command import slap
 
 OURS = AcquisitionSetup("stack_at_target", "fair", "training", AcquisitionSettings())
 
@@ -69,7 +68,7 @@ def test_every_part_is_told_apart_above():
 def study(*arguments):
     pytest.importorskip("matplotlib")
     command = ["study", "acquisition_ablation", *arguments]
-    return CliRunner().invoke(app, [str(argument) for argument in command])
+    return slap(*command)
 
 
 @pytest.mark.training

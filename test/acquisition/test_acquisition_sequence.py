@@ -7,7 +7,6 @@ from contextlib import nullcontext, suppress
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
 
 from slap_ros.acquisition.curriculum import jobs
 from slap_ros.acquisition.training.continued_training import earlier_starts
@@ -17,9 +16,9 @@ from slap_ros.api.acquisition import AcquisitionWatch, UnwatchedCurriculum, acqu
 from slap_ros.api.acquisition_request import AcquisitionRequest
 from slap_ros.api.acquisition_sequence import acquire_sequence
 from slap_ros.api.sequence_request import SequenceRequest
-from slap_ros.cli import app
 from slap_ros.skills.skill_library import load_skill_library
 from support.points import POINTS
+from support.slap_command import slap
 
 pytestmark = pytest.mark.usefixtures("points_installed", "in_this_process")
 SETTINGS = (
@@ -33,7 +32,7 @@ BUDGET = [*(word for one in SETTINGS for word in ("--set", one)), "--steps", 6_0
 
 def sequence(*arguments):
     command = ["acquire-sequence", "points", "--jobs", 1, "--json", *arguments]
-    return CliRunner().invoke(app, [str(argument) for argument in command])
+    return slap(*command)
 
 
 @pytest.mark.training

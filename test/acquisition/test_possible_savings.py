@@ -5,10 +5,9 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode
+from support.slap_command import slap
 from support.steady_skills import PICKING, write_library
 
 pytest.importorskip("matplotlib")
@@ -17,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("points_installed")
 
 def study(*arguments):
     command = ["study", "possible_savings", "points", "--preset", "line", *arguments]
-    return CliRunner().invoke(app, [str(argument) for argument in command])
+    return slap(*command)
 
 
 def test_what_a_push_can_save_is_found_and_within_its_bound(tmp_path):

@@ -5,12 +5,11 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.policies import shipped_models
 from slap_ros.skills.skill_library import AcquiredSkill
 from support.points import HORIZON, PUT, REWARDS
+from support.slap_command import slap
 from support.steady_skills import PICKING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
@@ -19,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("points_installed")
 def study(*arguments):
     pytest.importorskip("matplotlib")
     command = ["study", "acquisition", "points", *arguments]
-    return CliRunner().invoke(app, [str(argument) for argument in command])
+    return slap(*command)
 
 
 def test_progress_is_the_share_of_stages_that_were_done(tmp_path):

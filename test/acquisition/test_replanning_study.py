@@ -5,11 +5,10 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.skills.skill_library import AcquiredSkill
 from support.points import HORIZON, PUT, REWARDS
+from support.slap_command import slap
 from support.steady_skills import PICKING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
@@ -19,7 +18,7 @@ DROPPING = AcquiredSkill(PUT, REWARDS["Put"], towards(1, True, gain=0.0), HORIZO
 
 
 def ran(*arguments):
-    result = CliRunner().invoke(app, list(map(str, arguments)))
+    result = slap(*arguments)
     assert result.exit_code in (0, 1), result.output
     return result
 

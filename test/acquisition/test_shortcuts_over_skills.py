@@ -12,9 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from ensemble.observation import Episode
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from slap_ros.acquisition.curriculum.after_shortcuts import AfterShortcuts
@@ -45,14 +43,11 @@ from slap_ros.studies.comparison import PlanningSetup
 from slap_ros.studies.slap.planning_time import plan_once
 from support.points import REWARDS
 from support.points_training import SMALL
+from support.slap_command import slap
 from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 CHANGES = [word for change in SMALL for word in ("--set", change)]
-
-
-def slap(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def train(skills, output, *more):

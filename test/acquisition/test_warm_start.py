@@ -8,9 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
 from slap_ros.acquisition.curriculum.solved_shares import Point
 from slap_ros.acquisition.curriculum.task_source import TaskSource
@@ -32,6 +30,7 @@ from slap_ros.skills.skill_library import AcquiredSkill
 from slap_ros.studies.lg_sail.warm_start import StartComparison
 from support.marks import slow
 from support.points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
+from support.slap_command import slap
 from support.steady_skills import PICKING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
@@ -192,7 +191,7 @@ def test_where_no_known_skill_is_worth_it_the_skill_is_learned_from_scratch(tmp_
 def study(*arguments):
     pytest.importorskip("matplotlib")
     command = ["study", "warm_start", "points", *arguments]
-    return CliRunner().invoke(app, [str(argument) for argument in command])
+    return slap(*command)
 
 
 @pytest.mark.slow

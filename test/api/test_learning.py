@@ -6,19 +6,18 @@ import json
 from contextlib import nullcontext
 
 import pytest
-from typer.testing import CliRunner
 
 import slap_ros
 from slap_ros.api import training
 from slap_ros.api.proposers import Proposers
 from slap_ros.api.setting_texts import change_texts
-from slap_ros.cli import app
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.setting_changes import parse_changes
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.shortcuts.settings import TrainingSettings
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DEMONSTRATOR
+from support.slap_command import slap
 
 TOY = {
     "exploration.tasks": 2,
@@ -33,9 +32,9 @@ TOY = {
 STEPS = 6_000
 
 
-def slap(*arguments):
+def printed(*arguments):
     """What a ``slap`` command prints, in this process."""
-    ran = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    ran = slap(*arguments)
     assert ran.exit_code == 0, ran.stderr
     return ran.stdout
 
@@ -44,7 +43,7 @@ def slap(*arguments):
 def test_trials_are_those_of_the_command(domain, tmp_path):
     rows = slap_ros.evaluate(domain, tasks=1, seeds=1)
     file = tmp_path / "trials.json"
-    slap("evaluate", "obstacle2d", "--tasks", 1, "--seeds", 1, "--output", file)
+    printed("evaluate", "obstacle2d", "--tasks", 1, "--seeds", 1, "--output", file)
     stored = [
         {"approach": one["approach"], **trial}
         for one in json.loads(file.read_text(encoding="utf-8"))["approaches"]
@@ -71,7 +70,7 @@ def test_a_domain_is_evaluated_with_the_skills_that_it_was_made_with():
 def test_a_proposal_is_that_of_the_command():
     bench = slap_ros.make("stow_hammer")
     proposal = slap_ros.propose(bench, bench.task(seed=1), rewarder="composed")
-    told = slap("propose", "stow_hammer", "--seed", 1, "--rewarder", "composed", "--json")
+    told = printed("propose", "stow_hammer", "--seed", 1, "--rewarder", "composed", "--json")
     assert json.loads(json.dumps(proposal.to_data())) == json.loads(told)["proposal"]
 
 
@@ -90,7 +89,7 @@ def test_nothing_but_a_library_is_replaced_by_one(command, tmp_path):
     mine.parent.mkdir()
     mine.write_text("years of work", encoding="utf-8")
     for place in (mine, mine.parent):
-        ran = CliRunner().invoke(app, [*command, "--output", str(place)])
+        ran = slap(*command, "--output", place)
         assert ran.exit_code == InvalidParameterError.code
         assert "is no library" in " ".join(ran.stderr.split())
     assert mine.read_text(encoding="utf-8") == "years of work"
@@ -110,13 +109,13 @@ def test_a_library_replaces_none_of_another_kind_and_no_checkpoints(command, kin
     member.parent.mkdir(parents=True)
     for path in (member, tmp_path / "library" / "library.json"):
         path.write_text("{}", encoding="utf-8")
-    ran = CliRunner().invoke(app, [*command, "--output", str(tmp_path / "library")])
+    ran = slap(*command, "--output", tmp_path / "library")
     assert ran.exit_code == InvalidParameterError.code
     assert (f"a library of {kind}" if kind else "is no library") in " ".join(ran.stderr.split())
     assert member.read_text() == "{}"
     new = tmp_path / "new"
     for work in (new, new / "work"):
-        ran = CliRunner().invoke(app, [*command, "--output", str(new), "--work", str(work)])
+        ran = slap(*command, "--output", new, "--work", work)
         assert ran.exit_code == InvalidParameterError.code
         assert "would be lost when the library" in " ".join(ran.stderr.split())
     assert not new.exists()
@@ -142,7 +141,7 @@ def test_a_library_is_that_of_the_command(domain, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "some_workers", lambda *_: nullcontext(SequentialWorkers()))
     library = slap_ros.train(domain, tmp_path / "api", seed=5, changes=TOY, steps=STEPS)
     words = [word for text in change_texts(TOY) for word in ("--set", text)]
-    slap(
+    printed(
         "train", "obstacle2d", "--seed", 5, "--steps", STEPS, *words,
         "--output", tmp_path / "command", "--jobs", 1,
     )  # fmt: skip

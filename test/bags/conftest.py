@@ -10,14 +10,6 @@ from support.truthful_run import Script, record
 
 
 @pytest.fixture(scope="session")
-def script() -> Script:
-    """A run of one episode. Shared: not to be changed."""
-    script = Script(seed=7)
-    script.run()
-    return script
-
-
-@pytest.fixture(scope="session")
 def honest_bag(script: Script, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """It, recorded. Shared: not to be changed."""
     path = tmp_path_factory.mktemp("bags") / "honest"

@@ -16,10 +16,8 @@ import numpy as np
 import pytest
 import yaml
 from backports import zstd
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from typer.testing import CliRunner
+from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
 
-from ensemble.cli.application import app
 from slap_ros.bags import (
     bag_digest,
     bag_info,
@@ -33,30 +31,14 @@ from slap_ros.errors import DamagedBagError, SlapError
 from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.typestore import definition, typestore
 from support.marks import slow
+from support.rosbags_writer import write_with_rosbags
+from support.slap_command import slap
 from support.truthful_run import Published, Script, make
 
 MODES = (CompressionMode.FILE, CompressionMode.MESSAGE)
 STORAGES = (StoragePlugin.MCAP, StoragePlugin.SQLITE3)
 KINDS = [(mode, storage) for mode in MODES for storage in STORAGES]
 SUFFIX = {StoragePlugin.MCAP: ".mcap", StoragePlugin.SQLITE3: ".db3"}
-
-
-def write(path: Path, messages: list[Published], storage: StoragePlugin, compress: bool) -> None:
-    """A bag, its messages compressed or not."""
-    writer = Writer(path, version=9, storage_plugin=storage)
-    if compress:
-        writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
-    with writer:
-        connections = {}
-        for item in messages:
-            if item.topic not in connections:
-                connections[item.topic] = writer.add_connection(
-                    item.topic,
-                    item.type_name,
-                    msgdef=definition(item.type_name),
-                    rihs01=typestore().hash_rihs01(item.type_name),
-                )
-            writer.write(connections[item.topic], item.stamp_ns, item.cdr)
 
 
 def compress_files(path: Path) -> None:
@@ -83,11 +65,12 @@ def compressed(
     path = folder / "bag"
     path.mkdir()
     size = len(script.messages) // parts + 1
+    by_the_writer = CompressionMode.NONE if mode is CompressionMode.FILE else mode
     names = []
     for number in range(parts):
         part = folder / f"part{number}"
         messages = script.messages[number * size : (number + 1) * size]
-        write(part, messages, storage, mode is CompressionMode.MESSAGE)
+        write_with_rosbags(part, messages, storage, by_the_writer)
         names.append(f"bag_{number}{SUFFIX[storage]}")
         (part / f"part{number}{SUFFIX[storage]}").rename(path / names[-1])
     information = yaml.safe_load((folder / "part0" / "metadata.yaml").read_text())
@@ -123,7 +106,7 @@ def test_a_compressed_bag_is_the_same_bag(
 
 
 def write_plain(path: Path, script: Script, storage: StoragePlugin) -> Path:
-    write(path, script.messages, storage, compress=False)
+    write_with_rosbags(path, script.messages, storage)
     return path / f"{path.name}{SUFFIX[storage]}"
 
 
@@ -211,7 +194,7 @@ def test_every_command_takes_them(script: Script, tmp_path: Path) -> None:
         ("report", path, "--output", str(tmp_path / "run.html")),
         ("propose", *domain, "--demonstrations", path),
     ):
-        result = CliRunner().invoke(app, command)
+        result = slap(*command)
         assert result.exit_code == 0, (command, result.stderr)
 
 
@@ -242,7 +225,7 @@ def test_messages_that_overtook_others_while_they_were_compressed(
     places = {id(m): i + rng.random() * 12 for i, m in enumerate(script.messages)}
     mixed = sorted(script.messages, key=lambda message: places[id(message)])
     assert [m.stamp_ns for m in mixed] != sorted(m.stamp_ns for m in mixed)
-    write(tmp_path / "bag", mixed, storage, compress=True)
+    write_with_rosbags(tmp_path / "bag", mixed, storage, CompressionMode.MESSAGE)
     assert bag_digest(tmp_path / "bag") == bag_digest(honest_bag)
     assert evaluate_bag(tmp_path / "bag") == evaluate_bag(honest_bag)
 
@@ -252,7 +235,7 @@ def test_a_clock_that_was_set_back_is_no_overtaking(script: Script, tmp_path: Pa
     messages = [
         replace(m, stamp_ns=m.stamp_ns - hour * (i >= half)) for i, m in enumerate(script.messages)
     ]
-    write(tmp_path / "bag", messages, StoragePlugin.MCAP, compress=True)
+    write_with_rosbags(tmp_path / "bag", messages, StoragePlugin.MCAP, CompressionMode.MESSAGE)
     assert [m.stamp_ns for m in read_bag(tmp_path / "bag")] == [m.stamp_ns for m in messages]
 
 
@@ -303,24 +286,21 @@ def large_states(count: int) -> list[Published]:
 
 
 def in_messages(folder: Path) -> Path:
-    write(folder / "bag", large_states(20), StoragePlugin.SQLITE3, compress=True)
+    write_with_rosbags(
+        folder / "bag", large_states(20), StoragePlugin.SQLITE3, CompressionMode.MESSAGE
+    )
     return folder / "bag"
 
 
 def in_chunks(folder: Path) -> Path:
-    writer = Writer(folder / "bag", version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        topic = writer.add_connection(
-            "/slap/state", STATE, msgdef=definition(STATE), rihs01=typestore().hash_rihs01(STATE)
-        )
-        for item in large_states(20):
-            writer.write(topic, item.stamp_ns, item.cdr)
+    write_with_rosbags(
+        folder / "bag", large_states(20), StoragePlugin.MCAP, CompressionMode.STORAGE
+    )
     return folder / "bag"
 
 
 def in_files(folder: Path) -> Path:
-    write(folder / "bag", large_states(20), StoragePlugin.SQLITE3, compress=False)
+    write_with_rosbags(folder / "bag", large_states(20), StoragePlugin.SQLITE3)
     compress_files(folder / "bag")
     return folder / "bag"
 

@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros import load_bag
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, read_episodes, replay_bag
 from slap_ros.bags.demonstrations import read_demonstrations
@@ -23,6 +21,7 @@ from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE, TASK
 from slap_ros.report import read_report, render
 from slap_ros.robot.recorded_motion import read_recorded_motion
+from support.slap_command import slap
 from support.truthful_run import Published, Script, record, under
 
 SEEDS = {"/": 7, "/fleet/robot1": 11, "/robot2": 23}
@@ -114,30 +113,21 @@ def test_demonstrations_are_those_of_all(scripts: Mapping[str, Script], fleet: P
 
 
 def test_commands_name_and_choose_ensembles(fleet: Path, tmp_path: Path) -> None:
-    runner = CliRunner()
-    told = json.loads(runner.invoke(app, ["bag", "evaluate", str(fleet), "--json"]).stdout)
+    told = json.loads(slap("bag", "evaluate", fleet, "--json").stdout)
     assert {run["namespace"]: run["seed"] for run in told} == SEEDS
     one = ["--namespace", "/robot2"]
-    chosen = runner.invoke(app, ["bag", "evaluate", str(fleet), "--json", *one])
+    chosen = slap("bag", "evaluate", fleet, "--json", *one)
     assert json.loads(chosen.stdout)["seed"] == SEEDS["/robot2"]
-    table = runner.invoke(app, ["bag", "evaluate", str(fleet)])
+    table = slap("bag", "evaluate", fleet)
     assert "/robot2: obstacle2d" in table.stderr
-    render_it = [
-        "bag",
-        "render",
-        str(fleet),
-        "--size",
-        "64x48",
-        "--output",
-        str(tmp_path / "a.gif"),
-    ]
-    refused = runner.invoke(app, render_it)
+    render_it = ("bag", "render", fleet, "--size", "64x48", "--output", tmp_path / "a.gif")
+    refused = slap(*render_it)
     assert refused.exit_code == ErrorCode.INVALID_PARAMETER
     assert "choose with --namespace, of /, /fleet/robot1, /robot2" in refused.stderr
-    assert runner.invoke(app, [*render_it, *one]).exit_code == 0
-    page = ["report", str(fleet), "--output", str(tmp_path / "page.html"), *one]
-    assert runner.invoke(app, page).exit_code == 0
-    nobody = runner.invoke(app, ["bag", "replay", str(fleet), "--namespace", "/robot3"])
+    assert slap(*render_it, *one).exit_code == 0
+    page = slap("report", fleet, "--output", tmp_path / "page.html", *one)
+    assert page.exit_code == 0
+    nobody = slap("bag", "replay", fleet, "--namespace", "/robot3")
     assert nobody.exit_code == ErrorCode.INVALID_PARAMETER
     assert "only in /, /fleet/robot1, /robot2" in nobody.stderr
 

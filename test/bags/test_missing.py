@@ -11,15 +11,14 @@ from pathlib import Path
 
 import pytest
 import yaml
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import ATOMS, PLAN, PLAN_EVENT, SKILL_EVENT, STATE, TASK
 from slap_ros.report import read_report, render
+from support.slap_command import slap
 from support.truthful_run import Published, Script, record, without
 
 
@@ -66,7 +65,7 @@ def test_states_that_are_missing_are_missed_and_change_no_length(
 def test_the_command_says_so_and_ends_with_a_code(script: Script, tmp_path: Path) -> None:
     record(tmp_path / "bag", but(script, states(script)[3:5]))
     for command in ("info", "evaluate", "replay"):
-        result = CliRunner().invoke(app, ["bag", command, str(tmp_path / "bag"), "--json"])
+        result = slap("bag", command, tmp_path / "bag", "--json")
         assert result.exit_code == ErrorCode.DAMAGED_BAG, command
         assert "2 of" in result.stderr, command
         assert "2 of" in json.loads(result.stdout)["damage"], command
@@ -177,10 +176,10 @@ def test_the_command_says_what_is_not_known(script: Script, tmp_path: Path) -> N
     for lost in (ATOMS, PLAN_EVENT):
         path = tmp_path / lost.rpartition("/")[2]
         record(path, [item for item in script.messages if item.type_name != lost])
-        told = CliRunner().invoke(app, ["bag", "evaluate", str(path), "--json"])
+        told = slap("bag", "evaluate", path, "--json")
         assert told.exit_code == ErrorCode.DAMAGED_BAG
         assert json.loads(told.stdout)["success"] is None
-        table = CliRunner().invoke(app, ["bag", "evaluate", str(path)])
+        table = slap("bag", "evaluate", path)
         assert table.exit_code == ErrorCode.DAMAGED_BAG
         assert "not known whether solved" in table.stderr
 
@@ -190,7 +189,7 @@ def test_where_nothing_was_planned_nothing_is_missing(script: Script, tmp_path: 
     record(tmp_path / "bag", without(script.messages, "/slap/plan", "/slap/plan_events"))
     assert evaluate_bag(tmp_path / "bag").runs == []
     assert damages(tmp_path / "bag") == {None}
-    said = CliRunner().invoke(app, ["bag", "evaluate", str(tmp_path / "bag")])
+    said = slap("bag", "evaluate", tmp_path / "bag")
     assert said.exit_code == 0 and "no run" in said.stderr
 
 

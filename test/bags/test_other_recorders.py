@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
@@ -20,7 +20,8 @@ from slap_ros.bags.mcap_records import CHUNK
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import DamagedBagError, ForeignBagError, SlapError
 from slap_ros.messages.interfaces import PLAN, TASK
-from slap_ros.messages.typestore import definition, message_texts, typestore
+from slap_ros.messages.typestore import definition, message_texts
+from support.rosbags_writer import write_with_rosbags
 from support.truthful_run import Published, Script, make, record, under
 
 SEPARATOR = "=" * 80
@@ -39,33 +40,31 @@ def commented(type_name: str) -> str:
 
 
 def record_with_rosbags(
-    path: Path, messages: Iterable[Published], storage: StoragePlugin, compress: bool = False
+    path: Path,
+    messages: Iterable[Published],
+    storage: StoragePlugin,
+    compression: CompressionMode = CompressionMode.NONE,
 ) -> None:
-    writer = Writer(path, version=9, storage_plugin=storage)
-    if compress:
-        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        connections = {}
-        for item in messages:
-            if item.topic not in connections:
-                connections[item.topic] = writer.add_connection(
-                    item.topic,
-                    item.type_name,
-                    msgdef=commented(item.type_name),
-                    rihs01=typestore().hash_rihs01(item.type_name),
-                )
-            writer.write(connections[item.topic], item.stamp_ns, item.cdr)
+    write_with_rosbags(path, messages, storage, compression, commented)
 
 
 @pytest.mark.parametrize(
-    ("storage", "compress"),
-    [(StoragePlugin.SQLITE3, False), (StoragePlugin.MCAP, False), (StoragePlugin.MCAP, True)],
+    ("storage", "compression"),
+    [
+        (StoragePlugin.SQLITE3, CompressionMode.NONE),
+        (StoragePlugin.MCAP, CompressionMode.NONE),
+        (StoragePlugin.MCAP, CompressionMode.STORAGE),
+    ],
 )
 def test_stock_bags_tell_the_same(
-    script: Script, honest_bag: Path, tmp_path: Path, storage: StoragePlugin, compress: bool
+    script: Script,
+    honest_bag: Path,
+    tmp_path: Path,
+    storage: StoragePlugin,
+    compression: CompressionMode,
 ) -> None:
     path = tmp_path / "bag"
-    record_with_rosbags(path, script.messages, storage, compress)
+    record_with_rosbags(path, script.messages, storage, compression)
     assert bag_digest(path) == bag_digest(honest_bag)
     assert evaluate_bag(path) == evaluate_bag(honest_bag)
     assert replay_bag(path) == replay_bag(honest_bag)
@@ -75,7 +74,7 @@ def test_stock_bags_tell_the_same(
 
 def test_a_compressed_chunk_of_absurd_size_is_damage(script: Script, tmp_path: Path) -> None:
     path = tmp_path / "bag"
-    record_with_rosbags(path, script.messages, StoragePlugin.MCAP, compress=True)
+    record_with_rosbags(path, script.messages, StoragePlugin.MCAP, CompressionMode.STORAGE)
     file = path / "bag.mcap"
     data = bytearray(file.read_bytes())
     chunk = data.index(b"zstd") - 4 - CHUNK.size

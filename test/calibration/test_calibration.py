@@ -8,9 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import yaml
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.bags.run_recording import record_run
 from slap_ros.calibration.friction import identify_friction
 from slap_ros.calibration.pushes import find_pushes, read_pushes
@@ -25,6 +23,7 @@ from slap_ros.planning.options import OptionResult, hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.relational import Target
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from support.slap_command import slap
 
 PRESET = "fair:obstacles=1,distractors=0"
 MODEL = get_domain("obstacle_tower", PRESET)  # what is planned with
@@ -94,7 +93,7 @@ def recorded(path, domain, states, actions):
 
 
 def calibrate(*arguments):
-    return CliRunner().invoke(app, ["calibrate", *map(str, arguments)])
+    return slap("calibrate", *arguments)
 
 
 @pytest.fixture(scope="module")

@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from slap_ros.bags import read_episodes
-from slap_ros.cli.bag import app
+from support.slap_command import slap
 
 BAG = Path(__file__).parent.parent / "bags" / "data" / "recorded_by_0.1.0"
 
 
 def export(*arguments):
-    return CliRunner().invoke(app, ["export", *map(str, arguments)])
+    return slap("bag", "export", *arguments)
 
 
 @pytest.fixture

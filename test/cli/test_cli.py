@@ -12,9 +12,8 @@ from pathlib import Path
 import cv2
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
+from support.slap_command import slap
 
 KEYS = [
     "domain", "preset", "approach", "tasks", "seeds", "success_rate", "plan_length",
@@ -28,11 +27,6 @@ BAD_DOMAIN = """(define (domain d) (:requirements :strips :typing) (:types thing
 """
 GOOD_DOMAIN = BAD_DOMAIN.replace("(Missing ?x)", "(not (P ?x))")
 UNSOLVABLE = "(define (problem p) (:domain d) (:objects a - thing) (:init) (:goal (P a)))"
-
-
-def slap(*arguments):
-    """In this process, which has everything imported."""
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def slap_alone(*arguments):

@@ -6,10 +6,10 @@ import re
 import shlex
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import COMMANDS, app
+from ensemble.cli.application import COMMANDS
 from slap_ros.cli.help_pages import PANELS
+from support.slap_command import slap
 
 
 def leaves(command, path):
@@ -42,13 +42,13 @@ def test_every_panel_is_of_an_option_that_there_is(commands):
 
 @pytest.mark.parametrize("command", ["run", "plan", "evaluate", "train"])
 def test_help_names_no_number_that_nobody_would_give(command):
-    shown = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "100"}).stdout
+    shown = slap(command, "--help", COLUMNS="100").stdout
     assert "Task" in shown
     assert f"Example: slap {command}" in shown
     assert not re.search(r"\d{8,}", shown)
 
 
 def test_a_seed_beyond_what_messages_hold_is_refused():
-    answer = CliRunner().invoke(app, ["run", "obstacle2d", "--seed", str(2**63)])
+    answer = slap("run", "obstacle2d", "--seed", 2**63)
     assert answer.exit_code == 2
     assert f"{2**63} is too large" in " ".join(answer.stderr.split())

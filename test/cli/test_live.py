@@ -22,13 +22,6 @@ RUN = ["run", "obstacle2d", "--seed", "3", "--shortcuts", "none", "--in-process"
 RUN += ["--patience", "10"]  # for a loaded machine
 
 
-@pytest.fixture(scope="module")
-def script() -> Script:
-    script = Script(seed=7)
-    script.run()
-    return script
-
-
 def seen(messages: list[Published]) -> str:
     view, console = RunView(), Console(file=io.StringIO(), width=120)
     for item in messages:

@@ -11,12 +11,11 @@ from typing import Any
 
 import pytest
 from click.testing import Result
-from typer.testing import CliRunner
 
-from slap_ros.cli import app
 from slap_ros.cli.plan_pddl import plan_symbolically
 from slap_ros.errors import ErrorCode
 from slap_ros.relational.pddl import parse_domain, parse_problem
+from support.slap_command import slap
 from tools.check_plan import World, check, read_steps
 
 # A rover sends what it sampled from where it stands: often from where it sampled it.
@@ -62,7 +61,7 @@ def invoke(tmp_path: Path, texts: tuple[str, str], command: str, *options: str) 
     files = [tmp_path / "domain.pddl", tmp_path / "problem.pddl"]
     for file, text in zip(files, texts, strict=True):
         file.write_text(text, encoding="utf-8")
-    return CliRunner().invoke(app, [command, *map(str, files), *options])
+    return slap(command, *files, *options)
 
 
 def planned(tmp_path: Path, texts: tuple[str, str], *options: str) -> dict[str, Any]:
@@ -103,7 +102,7 @@ def test_costs_are_minimised_and_said(tmp_path: Path) -> None:
 def test_both_definitions_in_one_file(tmp_path: Path) -> None:
     file = tmp_path / "both.pddl"
     file.write_bytes("\n".join(PAIRS["survey"]).encode("utf-8-sig"))
-    result = CliRunner().invoke(app, ["plan", str(file), "--json"])
+    result = slap("plan", file, "--json")
     assert result.exit_code == 0, result.stderr
     assert len(json.loads(result.stdout)["plan"]) == 2
 

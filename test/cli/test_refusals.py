@@ -10,23 +10,23 @@ from inspect import signature
 from typing import get_args
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import COMMANDS, app
+from ensemble.cli.application import COMMANDS
 from ensemble.nodes import node_class
 from ensemble.parameters import _require_within, parse_parameters
 from ensemble.robot_parameters import MockRobotParameters, PlayerParameters, RobotBridgeParameters
 from slap_ros.domains import get_domain
 from slap_ros.domains.registry import OURS
 from slap_ros.errors import ErrorCode, InvalidParameterError
+from support.slap_command import slap
 
 NO_NUMBERS = ("nan", "inf", "-inf", "1e400", "-1e400")
 NO_SETTINGS = (*NO_NUMBERS, "9" * 400, "-" + "9" * 400, "9" * 5_000, "1e30", "-1e30", "nan..1")
 NOWHERE = "/proc/no/such"  # nobody can write there, root included
 
 
-def slap(*arguments):
-    result = CliRunner().invoke(app, list(arguments))
+def answer(*arguments):
+    result = slap(*arguments)
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result
 
@@ -104,7 +104,7 @@ def test_every_option_that_is_a_number_is_finite():
     assert {option for _, option in options} >= {"--pace", "--timeout", "--seconds"}
     for path, option in options:
         for value in NO_NUMBERS:
-            result = slap(*path, "obstacle2d", f"{option}={value}")
+            result = answer(*path, "obstacle2d", f"{option}={value}")
             assert result.exit_code in (2, ErrorCode.INVALID_PARAMETER), (path, option, value)
 
 
@@ -112,7 +112,7 @@ def test_every_option_that_is_a_whole_number_has_an_upper_end():
     options = list(options_of(int))
     assert {option for _, option in options} >= {"--tasks", "--seed", "--jobs", "--steps"}
     for path, option in options:
-        result = slap(*path, "obstacle2d", f"{option}={'9' * 400}")
+        result = answer(*path, "obstacle2d", f"{option}={'9' * 400}")
         assert result.exit_code in (2, ErrorCode.INVALID_PARAMETER), (path, option)
 
 
@@ -171,7 +171,7 @@ def test_parameters_on_the_command_line_are_finite(name, value):
 
 def test_a_robot_is_for_domains_with_a_panda():
     for world in ("mock", "robot"):
-        result = slap("run", "obstacle2d", "--world", world)
+        result = answer("run", "obstacle2d", "--world", world)
         assert result.exit_code == ErrorCode.INVALID_PARAMETER
         assert "no Panda" in result.stderr
 
@@ -200,7 +200,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_run(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     os.mkfifo(tmp_path / "pipe.gif")
-    result = slap(*arguments)
+    result = answer(*arguments)
     assert result.exit_code == ErrorCode.INPUT_OUTPUT, result.stderr
     assert len(result.stderr.strip().splitlines()) == 1  # no word of a run
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "pipe.gif"]
@@ -215,7 +215,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_run(
     ],
 )
 def test_what_a_run_could_not_learn_is_refused_before_it(options, words):
-    refused = slap("run", "obstacle2d", "--in-process", *options)
+    refused = answer("run", "obstacle2d", "--in-process", *options)
     assert words in " ".join(refused.output.split())
     assert refused.exit_code in (ErrorCode.INVALID_DOMAIN, ErrorCode.INVALID_PARAMETER)
     assert "solved" not in refused.output

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import psutil
 import pytest
 
 from slap_ros.bags import evaluate_bag
-from support.process_state import handles_signals
+from support.process_state import handles_signals, wait_until
 
 LIBRARY = Path(__file__).parents[1] / "shortcuts" / "data" / "obstacle2d"
 LIMIT_S = 120.0  # far more than anything here takes
@@ -23,13 +22,6 @@ ENDINGS = {signal.SIGINT: ("interrupted", 130), signal.SIGTERM: ("terminated", 1
 IN_THE_MIDDLE_S = 1.0  # of processor time: everything is imported by then
 EVALUATE = ("evaluate", "obstacle2d", "--tasks", "10000", "--jobs", "2", "--shortcuts", "none")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-
-
-def wait_until(condition):
-    end = time.monotonic() + LIMIT_S
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @contextmanager

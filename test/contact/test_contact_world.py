@@ -36,13 +36,9 @@ from slap_ros.worlds.contact.hand import LEASH, hand_at
 from slap_ros.worlds.contact.scene import TABLE, ContactScene, HandForces, box, cylinder
 from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, grasp_pose
+from support.states import changed
 
 STAY = np.zeros(5)
-
-
-def changed(state: State, name: str, **features: float) -> State:
-    obj = state.layout.object(name)
-    return state.replace({(obj, feature): value for feature, value in features.items()})
 
 
 # -- commands ---------------------------------------------------------------------------------

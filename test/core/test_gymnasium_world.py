@@ -13,8 +13,9 @@ import pytest
 
 from slap_ros.core.gymnasium_world import GymnasiumWorld, state_of
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
+from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.experiment import solve
 from slap_ros.relational import State
-from support.executed import executed
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "marbles"
 marbles = pytest.importorskip("marbles")
@@ -120,7 +121,7 @@ def test_the_broom_sweeps_several_marbles_where_the_skills_take_one():
 @pytest.mark.parametrize("seed", range(5))
 def test_the_example_is_solved_by_planning(seed):
     task = DOMAIN.task(seed)
-    episode = executed(task, DOMAIN)
+    episode = solve(DOMAIN, task, PURE_PLANNING)
     assert episode.success
     assert episode.replans == 0
 

@@ -18,11 +18,11 @@ from slap_ros.core.kinder_world import KinderBridge  # noqa: E402
 from slap_ros.domain_check import Experience, markov  # noqa: E402
 from slap_ros.domain_check.experience import Transition  # noqa: E402
 from slap_ros.errors import InvalidDomainError, InvalidStateError  # noqa: E402
-from slap_ros.evaluation.approaches import approaches  # noqa: E402
+from slap_ros.evaluation.approaches import PURE_PLANNING, approaches  # noqa: E402
+from slap_ros.evaluation.experiment import solve  # noqa: E402
 from slap_ros.relational import Feature  # noqa: E402
 from slap_ros.shortcuts.sampling import Sampling  # noqa: E402
 from slap_ros.shortcuts.shortcut_library import load_library  # noqa: E402
-from support.executed import executed  # noqa: E402
 
 DOMAIN = kinder_obstruction.make()
 TASK = DOMAIN.task(7)  # evaluation begins at seed 0
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Resetting dynamic2d")  # KinDER'
 @pytest.fixture(scope="module")
 def episode():
     """Both blocks are taken and put down: free motion, contacts, grasps, releases."""
-    return executed(TASK, DOMAIN)
+    return solve(DOMAIN, TASK, PURE_PLANNING)
 
 
 @pytest.fixture(scope="module")

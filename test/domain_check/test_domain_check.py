@@ -8,9 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.core import Task
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
@@ -18,6 +16,7 @@ from slap_ros.domains.obstacle2d.dynamics import Obstacle2DWorld
 from slap_ros.domains.registry import OURS
 from slap_ros.relational import Predicate, State
 from support.marks import slow
+from support.slap_command import slap
 
 FLAT = get_domain("obstacle2d")
 QUICK = ("obstacle2d", "obstacle_tower", "peg_in_hole")
@@ -179,6 +178,6 @@ def test_a_domain_in_which_nothing_can_be_solved_says_why_and_is_checked_all_the
 
 
 def test_the_command_prints_what_it_found_and_answers_with_a_code():
-    result = CliRunner().invoke(app, ["check", "obstacle2d", "--tasks", "2", "--json"])
+    result = slap("check", "obstacle2d", "--tasks", "2", "--json")
     assert result.exit_code == 0
     assert {"name", "status", "found", "advice"} == set(json.loads(result.stdout)[0])

@@ -26,6 +26,8 @@ from slap_ros.domains.cleanup_table.scene import BIN, FLOOR_TOP, TABLE, scene_of
 from slap_ros.domains.cleanup_table.shapes import TOYS, WIPER, shipped
 from slap_ros.domains.cleanup_table.tasks import make_task
 from slap_ros.errors import ErrorCode, InvalidParameterError
+from slap_ros.evaluation import experiment
+from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.planning.graph_planner import GraphPlanner
@@ -37,7 +39,7 @@ from slap_ros.worlds.features import BODY_FEATURES
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
-from support.executed import executed, fluent_atoms
+from support.states import changed, fluent_atoms
 
 FAIR, PAPER = get_domain("cleanup_table"), get_domain("cleanup_table", "paper")
 PLACES = {"duck": (0.4, 0.1, 0.0), "toy_robot": (0.5, 0.2, 0.0), "dinosaur": (0.6, 0.1, 0.0)}
@@ -48,16 +50,11 @@ AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def solve(task, domain=FAIR):
-    return executed(task, domain)
+    return experiment.solve(domain, task, PURE_PLANNING)
 
 
 def atoms(state, domain=FAIR):
     return fluent_atoms(state, domain)
-
-
-def changed(state, name, **features):
-    block = state.layout.object(name)
-    return state.replace({(block, feature): value for feature, value in features.items()})
 
 
 def test_a_table_is_perceived_as_it_is_laid():

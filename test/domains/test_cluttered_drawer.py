@@ -22,6 +22,8 @@ from slap_ros.domains.cluttered_drawer.tasks import (
 from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.errors import InvalidParameterError, InvalidStateError, SkillNotApplicableError
+from slap_ros.evaluation import experiment
+from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.geometry.pose import multiply, rotate
 from slap_ros.motion import linear_motion, nearest_configurations, retime
 from slap_ros.planning.abstract_graph import build_abstract_graph
@@ -34,7 +36,7 @@ from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Column, State, Target
 from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import MAX_STEP, grasp_pose
-from support.executed import executed, fluent_atoms
+from support.states import changed, fluent_atoms
 
 FAIR, PAPER = get_domain("cluttered_drawer"), get_domain("cluttered_drawer", "paper")
 HALF = 0.025  # m, half a block
@@ -44,7 +46,7 @@ LEFT_BLOCKER = (MIDDLE, NEIGHBOUR, 0.0)
 
 
 def solve(task, domain=FAIR):
-    return executed(task, domain)
+    return experiment.solve(domain, task, PURE_PLANNING)
 
 
 def atoms(state, domain=FAIR):
@@ -54,11 +56,6 @@ def atoms(state, domain=FAIR):
 def sides(state, domain=FAIR):
     """What is said of the sides of the target block."""
     return {atom for atom in atoms(state, domain) if "Blocking" in atom or "Clear" in atom}
-
-
-def moved(state, name, **features):
-    obj = state.layout.object(name)
-    return state.replace({(obj, feature): value for feature, value in features.items()})
 
 
 def random_states(initial, rng, count):
@@ -184,7 +181,7 @@ def test_margins_say_how_far_a_blocker_is_to_be_moved():
     column = Column((state.layout.object("block1"),))
 
     def margin(y):
-        return predicate.margin(moved(state, "block2", y=y), column)[0]
+        return predicate.margin(changed(state, "block2", y=y), column)[0]
 
     for y in (0.0675, 0.08, 0.09):
         assert margin(y) == pytest.approx(y - (HALF + FingerClearance().reach + HALF))
@@ -206,12 +203,12 @@ def test_only_a_block_that_stands_in_the_drawer_is_blocked():
     state = DrawerArrangement(TARGET, (LEFT_BLOCKER,)).task().initial_state
     free = {f"{side}Clear(block1)" for side in SIDES}
     assert "BlockingLeft(block2, block1)" in sides(state)
-    assert sides(moved(state, "block1", z=BOTTOM + HALF + 0.02)) == free
-    on_table = moved(state, "block1", x=FRONT + 0.1, z=TABLE_TOP + HALF)
+    assert sides(changed(state, "block1", z=BOTTOM + HALF + 0.02)) == free
+    on_table = changed(state, "block1", x=FRONT + 0.1, z=TABLE_TOP + HALF)
     assert sides(on_table) == free
     assert "On(block1, table)" in atoms(on_table)
-    assert "BlockingLeft(block2, block1)" in sides(moved(state, "block2", z=BOTTOM + HALF + 0.02))
-    assert sides(moved(state, "block2", z=BOTTOM + HALF + 0.06)) == free
+    assert "BlockingLeft(block2, block1)" in sides(changed(state, "block2", z=BOTTOM + HALF + 0.02))
+    assert sides(changed(state, "block2", z=BOTTOM + HALF + 0.06)) == free
 
 
 @pytest.mark.parametrize("turns", [FRONT_BACK, LEFT_RIGHT])

@@ -18,6 +18,8 @@ from slap_ros.domains.obstacle_tower.tasks import (
 )
 from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
+from slap_ros.evaluation import experiment
+from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.geometry.pose import Pose, from_rotation_vector, rotate
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.lazy_search import search_lazily
@@ -31,15 +33,15 @@ from slap_ros.worlds.features import POSE_FEATURES
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 from slap_ros.worlds.panda import MAX_STEP, hand_pose
-from support.executed import executed, fluent_atoms
 from support.marks import slow
 from support.random_states import random_states
+from support.states import fluent_atoms
 
 FAIR, PAPER = get_domain("obstacle_tower"), get_domain("obstacle_tower", "paper")
 
 
 def solve(task, domain=FAIR):
-    return executed(task, domain)
+    return experiment.solve(domain, task, PURE_PLANNING)
 
 
 def atoms(state, domain=FAIR):

@@ -16,7 +16,7 @@ from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.studies.lg_sail.vacuity import gather_starts, try_policies
-from support.executed import fluent_atoms
+from support.states import fluent_atoms, initial_states_at_rest
 
 NAME = "stack_at_target"
 DOMAIN = get_domain(NAME)
@@ -35,15 +35,8 @@ def with_demonstrator(preset):
 
 
 def test_tasks_differ_and_rest():
-    states = [DOMAIN.task(seed).initial_state for seed in range(100)]
-    assert len({state.key for state in states}) == 100
+    states = initial_states_at_rest(DOMAIN, lambda layout: layout.of_type(CUBE))
     assert all(fluent_atoms(state, DOMAIN) == INITIAL for state in states)
-    with DOMAIN.make_world(states[0]) as world:
-        for state in states:  # the world refuses what cannot be
-            world.reset(state)
-            rested = world.step(np.zeros(5))
-            for cube in state.layout.of_type(CUBE):
-                assert rested[cube].tobytes() == state[cube].tobytes()
 
 
 @pytest.mark.parametrize(

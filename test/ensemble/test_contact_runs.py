@@ -12,16 +12,11 @@ import pytest
 pytest.importorskip("pybullet")  # Bullet is an extra: without it there is nothing to test here
 
 from builtin_interfaces.msg import Time
-from typer.testing import CliRunner
 from visualization_msgs.msg import Marker
 
-from ensemble.cli.application import app
-from ensemble.client import RunClient
 from ensemble.encode import SCENE
-from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.run import RunRequest, run
-from ensemble.spinner import temporary_node
 from slap_ros.bags import bag_info, evaluate_bag, replay_bag
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import Recording
@@ -35,6 +30,8 @@ from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.worlds.panda import grasp_pose
+from support.bench import solved_by
+from support.slap_command import slap
 
 pytestmark = pytest.mark.timeout(180)  # runs in worlds with contact forces
 DOMAIN, SEED = "stack_at_target", 0
@@ -64,7 +61,7 @@ def test_a_goal_by_name_has_its_objects_in_the_world(network, tmp_path):
     assert "cereal" not in domain.task(1).initial_state.layout.by_name
     goal = ["--goal", "task3", "--seed", "1", "--record", str(tmp_path / "bag"), "--in-process"]
     goal += ["--patience", "10"]  # for a loaded machine
-    ran = CliRunner().invoke(app, ["run", "groceries", "--skills", "demonstrator", *goal])
+    ran = slap("run", "groceries", "--skills", "demonstrator", *goal)
     assert ran.exit_code == 0, ran.output
     (episode,) = Recording.of(read_bag(tmp_path / "bag")).episodes.values()
     assert {obj.name for obj in episode.states[0].objects} >= {"cereal", "basket"}
@@ -130,16 +127,7 @@ def test_nodes_that_were_given_other_skills_refuse_each_other(network):
     nodes = {name: dict(given) for name, given in node_parameters(settings()).items()}
     # s, for it will see no state
     nodes["planner_node"] |= {"skills": "none", "observation_timeout": 2.0}
-    with (
-        temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
-        InProcessLauncher(nodes, spinner.executor),
-    ):
-        assert spinner.spin_until(lambda: client.ready(recording=False), LIMIT_S)
-        sent = client.send((), 0, 5)
-        assert spinner.spin_until(sent.done, LIMIT_S)
-        ended = sent.result().get_result_async()
-        assert spinner.spin_until(ended.done, LIMIT_S)
-    result = ended.result().result
+    result = solved_by(nodes)
     assert result.error_code == ErrorCode.SKILLS_CHANGED
     assert "skills demonstrator" in result.error_msg and "given none" in result.error_msg
 
@@ -148,22 +136,13 @@ def test_nodes_without_skills_of_their_own_take_those_that_are_announced(network
     nodes = {name: dict(given) for name, given in node_parameters(settings()).items()}
     for name in ("perception_node", "skill_server", "planner_node"):
         nodes[name] |= {"skills": "", "domain": ""}
-    with (
-        temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
-        InProcessLauncher(nodes, spinner.executor),
-    ):
-        assert spinner.spin_until(lambda: client.ready(recording=False), LIMIT_S)
-        sent = client.send((), 0, 5)
-        assert spinner.spin_until(sent.done, LIMIT_S)
-        ended = sent.result().get_result_async()
-        assert spinner.spin_until(ended.done, LIMIT_S)
-    assert ended.result().result.success
+    assert solved_by(nodes).success
 
 
 @pytest.mark.parametrize("world", ["robot", "mock"])
 def test_a_robot_in_closed_loop_is_refused_with_a_code_of_its_own(world):
     arguments = ["run", DOMAIN, "--skills", DEMONSTRATOR, "--world", world]
-    refused = CliRunner().invoke(app, arguments)
+    refused = slap(*arguments)
     assert refused.exit_code == ErrorCode.OPEN_LOOP_ONLY
     assert "which nothing measures" in " ".join(refused.stderr.split())
     domain = get_domain(DOMAIN)
@@ -173,9 +152,9 @@ def test_a_robot_in_closed_loop_is_refused_with_a_code_of_its_own(world):
 
 
 def test_skills_that_there_are_not_are_refused():
-    refused = CliRunner().invoke(app, ["run", DOMAIN, "--skills", "best"])
+    refused = slap("run", DOMAIN, "--skills", "best")
     assert refused.exit_code == ErrorCode.INVALID_PARAMETER
-    refused = CliRunner().invoke(app, ["run", "obstacle2d", "--skills", DEMONSTRATOR])
+    refused = slap("run", "obstacle2d", "--skills", DEMONSTRATOR)
     assert refused.exit_code == ErrorCode.INVALID_PARAMETER
     assert "has no demonstrator" in " ".join(refused.stderr.split())
 

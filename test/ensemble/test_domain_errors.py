@@ -5,10 +5,9 @@
 import sys
 
 import pytest
-from slap_msgs.srv import ResetTask
 
 from ensemble.client import RunClient
-from ensemble.interfaces import FAULT, RESET_TASK
+from ensemble.interfaces import FAULT
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
@@ -16,8 +15,8 @@ from slap_ros.bags import evaluate_bag
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.interfaces import STATE
 from slap_ros.skills.domain_choice import DomainChoice
+from support.bench import EnsembleBench
 
-LIMIT = 120.0  # s, far more than anything here takes
 FRAGILE = """
 from dataclasses import replace
 from slap_ros.domains import get_domain
@@ -67,39 +66,24 @@ def make():
 """
 
 
-class Bench:
-    """An ensemble in this process, and a client."""
+class FragileEnsemble(EnsembleBench):
+    """An ensemble in this process whose domain may break, and a client."""
 
     def __init__(self, client, spinner, heard):
-        self.client, self.spinner, self.heard = client, spinner, heard
-
-    def until(self, condition):
-        assert self.spinner.spin_until(condition, LIMIT)
-
-    def result(self, future):
-        self.until(future.done)
-        return future.result()
-
-    def reset(self):
-        service = self.client.create_client(RESET_TASK.type, RESET_TASK.name)
-        self.until(service.service_is_ready)
-        return self.result(service.call_async(ResetTask.Request(seed=4))).episode
+        super().__init__(client, spinner)
+        self.heard = heard
 
     def states(self, episode):
         return [m for kind, m in self.heard if kind == STATE and m.episode == episode]
 
-    def solve(self, episode, part=""):
+    def solve_breaking(self, episode, part):
         """The result; ``part`` of the domain breaks once the plan is under way."""
         sent = self.client.send((), 0, 2, episode)
-        if part:
-            self.until(lambda: len(self.states(episode)) > 3)
-            sys.modules["fragile_domain"].BROKEN = part
+        self.until(lambda: len(self.states(episode)) > 3)
+        sys.modules["fragile_domain"].BROKEN = part
         result = self.result(self.result(sent).get_result_async()).result
         sys.modules["fragile_domain"].BROKEN = ""
         return result
-
-    def close_bag(self):
-        self.result(self.client.close_bag())
 
 
 @pytest.fixture
@@ -119,20 +103,20 @@ def bench(network, install_domain, tmp_path):
         ),
         InProcessLauncher(nodes, spinner.executor),
     ):
-        made = Bench(client, spinner, heard)
+        made = FragileEnsemble(client, spinner, heard)
         made.until(lambda: client.ready(True) and made.states(1))
         yield made
 
 
 @pytest.mark.parametrize("part", ["step", "predicate"])
 def test_an_error_of_a_domain_ends_the_episode_with_its_name(bench, tmp_path, part):
-    failed = bench.solve(1, part)
+    failed = bench.solve_breaking(1, part)
     assert failed.error_code == ErrorCode.INVALID_DOMAIN
     for words in ("domain fragile raised ZeroDivisionError", f"{part} divides by zero"):
         assert words in failed.error_msg
     again = bench.solve(1)  # the episode is over, though nothing is broken any more
     assert again.error_code == ErrorCode.INVALID_DOMAIN
-    assert bench.solve(bench.reset()).success  # every node has lived on
+    assert bench.solve(bench.reset(seed=4)).success  # every node has lived on
     bench.close_bag()
     found = evaluate_bag(tmp_path / "bag")
     assert found.damage is None
@@ -141,14 +125,15 @@ def test_an_error_of_a_domain_ends_the_episode_with_its_name(bench, tmp_path, pa
 
 
 def test_what_cannot_be_shown_is_not_missed(bench):
-    assert bench.solve(1, "bodies").success
+    assert bench.solve_breaking(1, "bodies").success
 
 
 @pytest.mark.parametrize("part", ["predicate", "static predicate"])
 def test_a_task_that_cannot_be_perceived_is_no_silence(bench, part):
     assert bench.solve(1).success
     sys.modules["fragile_domain"].BROKEN = part
-    failed = bench.solve(bench.reset())
+    failed = bench.solve(bench.reset(seed=4))
+    sys.modules["fragile_domain"].BROKEN = ""
     assert failed.error_code == ErrorCode.INVALID_DOMAIN
     assert f"{part} divides by zero" in failed.error_msg
-    assert bench.solve(bench.reset()).success
+    assert bench.solve(bench.reset(seed=4)).success

@@ -6,7 +6,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
@@ -19,18 +18,12 @@ from ensemble.interfaces import STATE
 from ensemble.network import is_embedded
 from ensemble.nodes import node_class
 from support import leftovers
+from support.process_state import wait_until
 from support.programs import environment
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 120.0
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-
-
-def wait_until(condition):
-    end = time.monotonic() + LIMIT_S
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @contextmanager

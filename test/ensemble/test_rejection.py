@@ -12,8 +12,7 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.errors import ErrorCode
 from slap_ros.skills.domain_choice import DomainChoice
-
-LIMIT = 120.0  # s, far more than anything here takes
+from support.bench import EnsembleBench
 
 
 class RejectingServer(Node):
@@ -51,15 +50,12 @@ def test_a_rejected_goal_ends_the_run_and_says_which(network):
         spinner.executor.add_node(server)
         try:
             with InProcessLauncher(nodes, spinner.executor):
-                assert spinner.spin_until(lambda: client.ready(recording=False), LIMIT)
-                sent = client.send((), 0, 5)
-                assert spinner.spin_until(sent.done, LIMIT)
-                ended = sent.result().get_result_async()
-                assert spinner.spin_until(ended.done, LIMIT)
-                assert spinner.spin_until(lambda: client.log.complete, LIMIT)
+                bench = EnsembleBench(client, spinner)
+                bench.until(lambda: client.ready(recording=False))
+                result = bench.solve(max_replans=5)
+                bench.until(lambda: client.log.complete)
         finally:
             server.destroy_node()
-    result = ended.result().result
     assert result.error_code == ErrorCode.SKILL_REJECTED
     (name,) = server.asked  # once: what is rejected is not a divergence
     assert f"rejected {name}(" in result.error_msg

@@ -12,9 +12,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from ensemble.cli.event_printer import EventPrinter
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
@@ -28,6 +26,7 @@ from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
 from slap_ros.skills.domain_choice import DomainChoice
+from support.slap_command import slap
 
 FRAMES = "tf2_msgs/msg/TFMessage"
 PATIENCE = 5.0  # for a loaded machine
@@ -52,7 +51,7 @@ def request(record=None, seed=3, in_process=True, **options):
     return RunRequest(settings, timeout_s=200, in_process=in_process, **options)
 
 
-def slap(*arguments, **options):
+def slap_alone(*arguments, **options):
     command = [sys.executable, "-m", "ensemble.cli", *arguments]
     return subprocess.run(command, capture_output=True, text=True, timeout=200, **options)
 
@@ -68,9 +67,9 @@ def atoms_by_step(bag):
 def test_live_bag_in_process_and_offline_agree_to_the_digit(network, tmp_path):
     arguments = ["--seed", "3", "--shortcuts", "none", "--record", str(tmp_path / "a")]
     arguments += ["--planner", "lazy", "--patience", str(PATIENCE)]
-    live = slap("run", "obstacle2d", *arguments, "--json")
+    live = slap_alone("run", "obstacle2d", *arguments, "--json")
     assert live.returncode == 0, live.stderr
-    from_bag = slap("bag", "evaluate", str(tmp_path / "a"), "--json")
+    from_bag = slap_alone("bag", "evaluate", str(tmp_path / "a"), "--json")
     assert from_bag.returncode == 0, from_bag.stderr
     live_numbers, bag_numbers = json.loads(live.stdout), json.loads(from_bag.stdout)
     assert bag_numbers["atom_mismatches"] == 0
@@ -186,7 +185,7 @@ def test_planning_goes_on_while_the_robot_moves_as_in_an_experiment(network, tmp
 def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
     arguments = ["--seed", "3", "--shortcuts", "none", "--in-process"]
     arguments += ["--patience", str(PATIENCE)]
-    live = slap("run", "obstacle2d", *arguments, "--perception", "hidden=block1,memory=5")
+    live = slap_alone("run", "obstacle2d", *arguments, "--perception", "hidden=block1,memory=5")
     assert live.returncode == 77, live.stderr
     assert "the goal is about what is not detected: block1" in live.stderr
 
@@ -202,7 +201,7 @@ def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
     ],
 )
 def test_perception_that_cannot_be_is_refused_before_anything_starts(perception, words):
-    result = CliRunner().invoke(app, ["run", "obstacle2d", "--perception", perception])
+    result = slap("run", "obstacle2d", "--perception", perception)
     assert result.exit_code == 15
     assert words in " ".join(result.stderr.split())
 
@@ -220,7 +219,7 @@ def test_a_goal_of_ones_own_is_reached_and_recognised(network, tmp_path):
 
 def test_an_unsolvable_goal_says_so_live_and_in_the_bag(network, tmp_path):
     goal = "(and (Holding robot block1) (Holding robot block2))"
-    live = slap(
+    live = slap_alone(
         "run", "obstacle2d", "--goal", goal, "--record", str(tmp_path / "bag"), "--in-process"
     )
     assert live.returncode == 30, live.stderr

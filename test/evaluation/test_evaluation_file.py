@@ -8,9 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.experiment import Trial
@@ -18,6 +16,7 @@ from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, PlanExecuti
 from slap_ros.planning.options import hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from support.marks import slow
+from support.slap_command import slap
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 COMMAND = ["evaluate", "obstacle2d", "--tasks", "2", "--seeds", "2", "--first-seed", "500"]
@@ -25,7 +24,7 @@ WITH = ["--shortcuts", str(LIBRARY), "--samples", "2"]
 
 
 def evaluate(file, *options):
-    result = CliRunner().invoke(app, [*COMMAND, *options, "--output", str(file)])
+    result = slap(*COMMAND, *options, "--output", file)
     return result.exit_code, " ".join(result.stderr.split())
 
 
@@ -62,7 +61,7 @@ def test_its_command_makes_it_again(file, tmp_path, more):
     assert [option for option in more if option not in shlex.split(command)] == []
     again = tmp_path / "again.json"
     arguments = [*shlex.split(command)[1:], "--output", str(again)]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert slap(*arguments).exit_code == 0
 
     def rows(path):
         return [

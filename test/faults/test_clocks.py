@@ -5,30 +5,26 @@
 from contextlib import contextmanager
 
 import pytest
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from ensemble.client import RunClient
 from ensemble.nodes import RunSettings, node_class, node_parameters
-from ensemble.spinner import Spinner
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.interfaces import ATOMS, PLAN_EVENT, STATE
 from slap_ros.skills.domain_choice import DomainChoice
+from support.bench import LIMIT, EnsembleBench, one_executor
 from support.clocks import BY_THE_CLOCK, SettableClock
-from support.faulty_links import Laboratory
 
-LIMIT = 120.0  # s, far more than anything here takes
 PACE = 40.0  # environment steps per second
 DAY = 86_400.0  # s
 SET_BY = (-0.3, -3.0, -DAY, 400.0 * DAY)  # s
 
 
-class ClockLaboratory(Laboratory):
+class ClockLaboratory(EnsembleBench):
     """An ensemble that goes by a clock that can be set."""
 
     def __init__(self, client, spinner, clock, heard):
-        super().__init__(client, spinner, relay=None)
+        super().__init__(client, spinner)
         self.clock, self.heard = clock, heard
 
     def of_type(self, type_name, episode):
@@ -38,14 +34,11 @@ class ClockLaboratory(Laboratory):
         """Set the clock while planning, while executing, and between one run and the next."""
         episode = self.reset(seed)
         sent = self.client.send((), 0, 0, episode)
-        assert self.spinner.spin_until(lambda: self.of_type(PLAN_EVENT, episode), LIMIT)
+        self.until(lambda: self.of_type(PLAN_EVENT, episode))
         self.clock.set_by(-set_by)
-        assert self.spinner.spin_until(lambda: len(self.of_type(STATE, episode)) > 3, LIMIT)
+        self.until(lambda: len(self.of_type(STATE, episode)) > 3)
         self.clock.set_by(2.0 * set_by)
-        assert self.spinner.spin_until(sent.done, LIMIT)
-        ended = sent.result().get_result_async()
-        assert self.spinner.spin_until(ended.done, LIMIT)
-        result = ended.result().result
+        result = self.result(self.result(sent).get_result_async()).result
         assert result.success, result.error_msg
         self.clock.set_by(-2.0 * set_by)
         return result
@@ -65,9 +58,7 @@ def laboratory(bag):
         patience=5.0,
     )
     heard = []
-    rclpy.init()
-    executor, nodes = SingleThreadedExecutor(), []
-    try:
+    with one_executor() as (nodes, spinner):
         nodes.append(clock := SettableClock())
         nodes.append(client := RunClient(lambda *message: heard.append(message)))
         for name, parameters in node_parameters(settings).items():
@@ -75,18 +66,13 @@ def laboratory(bag):
             overrides = [Parameter(key, value=value) for key, value in given.items()]
             nodes.append(node_class(name)(parameter_overrides=overrides))
         for node in nodes:
-            executor.add_node(node)
-        bench = ClockLaboratory(client, Spinner(executor), clock, heard)
-        assert bench.spinner.spin_until(lambda: client.ready(True), LIMIT)
+            spinner.executor.add_node(node)
+        bench = ClockLaboratory(client, spinner, clock, heard)
+        bench.until(lambda: client.ready(True))
         # Perception opens its first episode when the domain is imported; one that was closed by
         # then is not perceived.
-        assert bench.spinner.spin_until(lambda: bench.of_type(ATOMS, 1), LIMIT)
+        bench.until(lambda: bench.of_type(ATOMS, 1))
         yield bench
-    finally:
-        for node in reversed(nodes):
-            node.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
 
 
 @pytest.mark.slow

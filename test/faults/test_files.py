@@ -10,10 +10,8 @@ from itertools import cycle
 from pathlib import Path
 
 import pytest
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from typer.testing import CliRunner
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
-from ensemble.cli.application import app
 from ensemble.entry_point import run_node
 from sim_node.node import SimNode
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
@@ -25,7 +23,6 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.meshes.obj import from_obj
 from slap_ros.meshes.solid import Solid
-from slap_ros.messages.typestore import definition, typestore
 from slap_ros.relational.pddl import write_domain, write_problem
 from slap_ros.report import read_report, render
 from slap_ros.robot.scene_config import read_scene_config
@@ -38,7 +35,9 @@ from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.slap.trainings import TrainingFolder
 from support.damage import DAMAGES
 from support.marks import slow
-from support.truthful_run import Script, record, under
+from support.rosbags_writer import write_with_rosbags
+from support.slap_command import slap
+from support.truthful_run import record, under
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
 ROOT = Path(__file__).parents[2]
@@ -75,28 +74,8 @@ def count(request):
 # -- bags -----------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def script():
-    script = Script(seed=7)
-    script.run()
-    return script
-
-
-def with_sqlite(path, messages, compression=None):
-    writer = Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3)
-    if compression is not None:
-        writer.set_compression(compression, CompressionFormat.ZSTD)
-    with writer:
-        connections = {}
-        for item in messages:
-            if item.topic not in connections:
-                connections[item.topic] = writer.add_connection(
-                    item.topic,
-                    item.type_name,
-                    msgdef=definition(item.type_name),
-                    rihs01=typestore().hash_rihs01(item.type_name),
-                )
-            writer.write(connections[item.topic], item.stamp_ns, item.cdr)
+def with_sqlite(path, messages, compression=CompressionMode.NONE):
+    write_with_rosbags(path, messages, StoragePlugin.SQLITE3, compression)
 
 
 def with_compressed_messages(path, messages):
@@ -258,7 +237,7 @@ def test_damaged_pddl_is_planned_for_or_refused(tmp_path, name, count):
     command = ["plan", *(str(tmp_path / part) for part in ("domain.pddl", "problem.pddl"))]
     codes = set()
     for case in damaged_files(tmp_path / name, FEW * count, name):
-        result = CliRunner().invoke(app, command)
+        result = slap(*command)
         assert isinstance(result.exception, SystemExit | None), (case, result.exception)
         assert result.exit_code != ErrorCode.UNKNOWN, case
         codes.add(ErrorCode(result.exit_code))

@@ -23,6 +23,7 @@ from slap_ros.bags import bag_info, evaluate_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, SlapError, UnknownDomainError
 from slap_ros.shortcuts.shortcut_library import load_library
+from support.rosbags_writer import write_messages
 from support.truthful_run import Script, record
 
 ROOT = Path(__file__).parents[2]
@@ -103,33 +104,16 @@ def test_metadata_is_no_program(tmp_path, tag):
         "int32[<=__import__('os').mkdir('DONE')] y\n",
     ],
 )
-def test_a_message_definition_is_no_program(tmp_path, definition, monkeypatch):
+def test_a_message_definition_is_no_program(tmp_path, script, definition, monkeypatch):
     """Deserialisers are generated from the definitions that a bag brings along."""
     monkeypatch.chdir(tmp_path)
     hostile = "geometry_msgs/msg/Odd"
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection("/odd", hostile, msgdef=definition, rihs01="RIHS01_0")
         writer.write(connection, 1, bytes(64))
-        script = Script(seed=7)
-        script.run()
-        connections = {}
-        for item in script.messages:
-            if item.topic not in connections:
-                connections[item.topic] = add(writer, item)
-            writer.write(connections[item.topic], item.stamp_ns, item.cdr)
+        write_messages(writer, script.messages)
     assert evaluate_bag(tmp_path / "bag").runs[0].success
     assert everything_in(tmp_path) == ["bag", "bag/bag.mcap", "bag/metadata.yaml"]
-
-
-def add(writer, item):
-    from slap_ros.messages.typestore import definition, typestore
-
-    return writer.add_connection(
-        item.topic,
-        item.type_name,
-        msgdef=definition(item.type_name),
-        rihs01=typestore().hash_rihs01(item.type_name),
-    )
 
 
 def test_a_shortcut_does_not_choose_its_folder(tmp_path):

@@ -6,7 +6,8 @@ import pytest
 
 from slap_ros.bags import evaluate_bag
 from slap_ros.errors import ErrorCode
-from support.faulty_links import LIMIT, laboratory
+from support.bench import LIMIT
+from support.faulty_links import laboratory
 
 
 @pytest.mark.timeout(4 * LIMIT)

@@ -6,12 +6,9 @@ from contextlib import contextmanager
 from copy import deepcopy
 
 import pytest
-import rclpy
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory, GripperCommand
 from rclpy.action import ActionClient
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter
 from slap_msgs.action import ExecuteSkill, SolveTask
 from slap_msgs.msg import GroundAtom
 from slap_msgs.srv import ListSkills, ResetTask
@@ -26,14 +23,18 @@ from ensemble.interfaces import (
     RESET_TASK,
     SOLVE_TASK,
 )
-from ensemble.nodes import RunSettings, node_class, node_parameters
-from ensemble.spinner import Spinner
+from ensemble.launcher import InProcessLauncher
+from ensemble.nodes import RunSettings, node_parameters
+from ensemble.spinner import temporary_node
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.interfaces import TASK
 from slap_ros.skills.domain_choice import DomainChoice
+from support.bench import LIMIT, Bench
 
 pytestmark = pytest.mark.timeout(300)  # dozens of requests, some of which wait in vain
-LIMIT = 120.0  # s, far more than anything here takes
+MOCK = RunSettings(
+    DomainChoice("obstacle_tower", "fair"), 1, 0, "lazy", None, world="mock", mock={"pace": 50.0}
+)
 BRIEFLY = 3.0  # s, for what may last for good and need not succeed
 # What is waited for in vain is waited for less long than in a laboratory.
 HASTY = {"planner_node": {"observation_timeout": 1.0}, "skill_server": {"state_timeout": 1.0}}
@@ -74,59 +75,45 @@ def field_variants(value, kind):
         yield from BOUNDARIES[kind]
 
 
-class Bench:
-    """Nodes and a client on one executor: what a callback raises comes out here."""
+class AskedNodes(Bench):
+    """Nodes that are asked for whatever can be asked for."""
 
-    def __init__(self, executor, client, heard):
-        self.client, self.heard, self.spinner = client, heard, Spinner(executor)
+    def __init__(self, client, spinner, heard):
+        super().__init__(client, spinner)
+        self.heard = heard
         self.client.create_subscription(PLAN.type, PLAN.name, self.on_plan, PLAN.qos)
         self.plans = []
 
     def on_plan(self, message):
         self.plans.append(message)
 
-    def until(self, condition):
-        assert self.spinner.spin_until(condition, LIMIT), "hung"
-
-    def call(self, service, request):
-        client = self.client.create_client(service.type, service.name)
-        self.until(client.service_is_ready)
-        answer = client.call_async(request)
-        self.until(answer.done)
-        self.client.destroy_client(client)
-        return answer.result()
+    @property
+    def task(self):
+        """The newest task; None before there is one."""
+        return next((m for kind, m in self.heard[::-1] if kind == TASK), None)
 
     def ask(self, client, goal, longest_s=LIMIT):
         """Its status and result; none where it is rejected. What lasts longer is canceled."""
-        sent = client.send_goal_async(goal)
-        self.until(sent.done)
-        if not sent.result().accepted:
+        handle = self.result(client.send_goal_async(goal))
+        if not handle.accepted:
             return None
-        ended = sent.result().get_result_async()
+        ended = handle.get_result_async()
         if not self.spinner.spin_until(ended.done, longest_s):
-            sent.result().cancel_goal_async()
-            self.until(ended.done)
-        return ended.result()
+            handle.cancel_goal_async()
+        return self.result(ended)
 
 
 @contextmanager
 def bench(parameters):
     heard = []
-    rclpy.init()
-    executor, nodes = SingleThreadedExecutor(), []
-    try:
-        nodes.append(client := RunClient(lambda *message: heard.append(message)))
-        for name, values in parameters.items():
-            overrides = [Parameter(key, value=value) for key, value in values.items()]
-            nodes.append(node_class(name)(parameter_overrides=overrides))
-        for node in nodes:
-            executor.add_node(node)
-        yield Bench(executor, client, heard)
-    finally:
-        for node in reversed(nodes):
-            node.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
+    with (
+        temporary_node(lambda: RunClient(lambda *message: heard.append(message))) as (
+            client,
+            spinner,
+        ),
+        InProcessLauncher(parameters, spinner.executor),
+    ):
+        yield AskedNodes(client, spinner, heard)
 
 
 @contextmanager
@@ -150,9 +137,6 @@ def ensemble(network, tmp_path):
 def hasty_ensemble(network, tmp_path):
     with recorded_ensemble(tmp_path / "bag", HASTY) as found:
         yield found
-
-
-Bench.task = property(lambda self: next((m for kind, m in self.heard[::-1] if kind == TASK), None))
 
 
 def answered(result):
@@ -203,16 +187,7 @@ def test_a_bag_can_be_closed_again_and_again(ensemble):
 
 def test_whatever_a_robot_is_asked_to_begin_with_it_answers(network):
     pytest.importorskip("pybullet")
-    settings = RunSettings(
-        DomainChoice("obstacle_tower", "fair"),
-        1,
-        0,
-        "lazy",
-        None,
-        world="mock",
-        mock={"pace": 50.0},
-    )
-    nodes = node_parameters(settings)
+    nodes = node_parameters(MOCK)
     with bench({name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}) as found:
         found.until(lambda: found.task)
         sampled = ResetTask.Request(seed=1, index=1, goal=found.task.goal)
@@ -224,16 +199,7 @@ def test_whatever_a_robot_is_asked_to_begin_with_it_answers(network):
 
 def test_whatever_the_controllers_are_asked_they_answer(network):
     pytest.importorskip("pybullet")
-    settings = RunSettings(
-        DomainChoice("obstacle_tower", "fair"),
-        1,
-        0,
-        "lazy",
-        None,
-        world="mock",
-        mock={"pace": 50.0},
-    )
-    only = {"robot_bridge.mock": node_parameters(settings)["robot_bridge.mock"]}
+    only = {"robot_bridge.mock": node_parameters(MOCK)["robot_bridge.mock"]}
     with bench(only) as found:
         arm = ActionClient(
             found.client, FollowJointTrajectory, "panda_arm_controller/follow_joint_trajectory"

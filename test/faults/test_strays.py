@@ -14,17 +14,11 @@ from ensemble.interfaces import ATOMS, DOMAIN, FAULT, STATE, TASK
 from ensemble.refusals import Refusals
 from sim_node.node import SimNode
 from slap_ros.bags import evaluate_bag
-from support.stray_laboratory import LIMIT, laboratory
+from support.flood import changed
+from support.stray_laboratory import laboratory
 
 pytestmark = pytest.mark.timeout(180)  # an ensemble is heard of in heartbeats alone
 LATEST = 2**31 - 1  # s since the epoch, in 2038: the last that a stamp can have
-
-
-def changed(message, **fields):
-    message = deepcopy(message)
-    for name, value in fields.items():
-        setattr(message, name, value)
-    return message
 
 
 def stamped(message, sec):
@@ -108,12 +102,12 @@ def test_a_task_is_opened_that_a_refused_one_overtook(network, tmp_path):
             lambda episode, _: opened.append(episode.number),
             Refusals(bench.client),
         )
-        assert bench.spinner.spin_until(lambda: opened == [episode], LIMIT)
+        bench.until(lambda: opened == [episode])
         after = changed(bench.newest[TASK.name], episode=episode + 1)
         for message in (after, spoilt(after)):  # before either is open
             tracker._on_task(message)
         assert tracker.refusal is not None
-        assert bench.spinner.spin_until(lambda: len(opened) > 1, LIMIT)
+        bench.until(lambda: len(opened) > 1)
         assert opened == [episode, episode + 1]
         tracker.destroy()
 
@@ -130,19 +124,15 @@ def test_a_world_that_is_reset_twice_at_once_is_perceived(network, tmp_path):
         try:
             bench.reset(1)
             newest = bench.reset(2)
-            assert bench.spinner.spin_until(
-                lambda: {tracker._task.episode for tracker in trackers} == {newest}, LIMIT
-            )
-            assert bench.spinner.spin_until(lambda: len(perception._early) == 2, LIMIT)
+            bench.until(lambda: {tracker._task.episode for tracker in trackers} == {newest})
+            bench.until(lambda: len(perception._early) == 2)
             perceive.set()
-            assert bench.spinner.spin_until(
-                lambda: all(len(waiting._early) == 2 for waiting in synchronizers), LIMIT
-            )
+            bench.until(lambda: all(len(waiting._early) == 2 for waiting in synchronizers))
         finally:
             perceive.set()
             observe.set()
-        assert bench.spinner.spin_until(
-            lambda: all(waiting.latest.episode.number == newest for waiting in synchronizers), LIMIT
+        bench.until(
+            lambda: all(waiting.latest.episode.number == newest for waiting in synchronizers)
         )
 
 
@@ -153,7 +143,7 @@ def test_a_second_simulator_is_named_and_followed_once_the_first_is_gone(network
         other = SimNode(parameter_overrides=[Parameter("domain", value="cluttered_drawer")])
         bench.nodes.append(other)
         bench.spinner.executor.add_node(other)
-        assert bench.spinner.spin_until(lambda: bench.more_refused("refused_tasks", before), LIMIT)
+        bench.until(lambda: bench.more_refused("refused_tasks", before))
         assert "/sim_node and /sim_node publish tasks on this network" in capfd.readouterr().err
         assert bench.solve().success  # the first simulator's task
         first = next(node for node in bench.nodes if isinstance(node, SimNode))
@@ -161,6 +151,4 @@ def test_a_second_simulator_is_named_and_followed_once_the_first_is_gone(network
         first.destroy_node()
         followed = bench.newest[TASK.name]
         assert followed.domain == "cluttered_drawer"
-        assert bench.spinner.spin_until(
-            lambda: bench.newest[ATOMS.name].header == followed.header, LIMIT
-        )
+        bench.until(lambda: bench.newest[ATOMS.name].header == followed.header)

@@ -7,9 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode, InvalidParameterError, LanguageUnavailableError
 from slap_ros.language.asking import MAX_LINE, AskingClient, FolderChannel, TerminalChannel
 from slap_ros.language.cassette import read_cassette
@@ -17,6 +15,7 @@ from slap_ros.language.prompts import SYSTEM, conversation
 from slap_ros.language.request import Request
 from slap_ros.language.schema import decomposition_schema
 from slap_ros.language.settings import LanguageSettings
+from support.slap_command import slap
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "peg_in_hole"
 TASK = [str(EXAMPLE / "domain.pddl"), str(EXAMPLE / "problem.pddl")]
@@ -27,7 +26,7 @@ NAME = "A chat, seen in November"
 def propose(folder, *options, model=f"ask:{NAME}"):
     arguments = ["propose", *TASK, "--proposer", "language", "--model", model]
     arguments += ["--base-url", f"folder:{folder}"] if folder else []
-    result = CliRunner().invoke(app, [*arguments, *map(str, options)])
+    result = slap(*arguments, *options)
     return result.exit_code, result.stdout, " ".join(result.stderr.split())
 
 

@@ -18,7 +18,6 @@ import typer
 from typer.testing import CliRunner
 
 from slap_ros.acquisition.training.embedding_encoder import EmbeddingEncoder
-from slap_ros.cli import app
 from slap_ros.cli.console import exits
 from slap_ros.errors import LanguageUnavailableError, SlapError
 from slap_ros.language.client import OpenAIClient
@@ -28,6 +27,7 @@ from slap_ros.redaction import without_secrets
 from support.model_answers import SETTINGS, good_script
 from support.paper_problems import peg_in_hole
 from support.scripted_server import Step, serving
+from support.slap_command import slap
 
 PEGS = peg_in_hole()
 EXAMPLE = Path(__file__).parents[2] / "examples" / "peg_in_hole"
@@ -93,7 +93,7 @@ def proposed(kept: Path, url: str) -> str:
         "--base-url", url, "--language-settings", kept / "settings.json", "--attempts", 4,
         "--cassette", f"record:{kept / 'cassette.jsonl'}", "--output", kept / "proposal",
     ]  # fmt: skip
-    result = CliRunner().invoke(app, [str(word) for word in words])
+    result = slap(*words)
     assert result.exit_code not in (0, 2)
     raised = "".join(traceback.format_exception(result.exception)) if result.exception else ""
     return everything(kept, result.stdout, result.stderr, raised)

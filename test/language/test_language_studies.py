@@ -10,9 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode, InvalidCassetteError
 from slap_ros.language.cassette import open_client, read_cassette
 from slap_ros.studies.job_runner import JobRunner
@@ -32,6 +30,7 @@ from slap_ros.studies.study_log import StudyLog
 from support.model_answers import SETTINGS, decomposition_json, operator_json, plan_json
 from support.paper_problems import peg_in_hole
 from support.scripted_server import Step, serving
+from support.slap_command import slap
 
 ROOT = Path(__file__).parents[2]
 PEGS = peg_in_hole()
@@ -191,10 +190,7 @@ def test_what_a_script_says_is_no_result(tmp_path) -> None:
                 1,
                 runner(tmp_path),
             )
-        live = CliRunner().invoke(
-            app,
-            [*COMMAND, "--base-url", server.url, "--output", str(tmp_path)],
-        )
+        live = slap(*COMMAND, "--base-url", server.url, "--output", tmp_path)
     assert live.exit_code == ErrorCode.INVALID_CASSETTE
     assert "no result of a study" in " ".join(live.stderr.split())
     assert not list(tmp_path.iterdir())
@@ -218,7 +214,7 @@ def test_a_page_names_the_day_and_the_recording(tmp_path: Path) -> None:
 
 def test_the_command_refuses_what_cannot_be() -> None:
     def refusal(*arguments: str) -> str:
-        result = CliRunner().invoke(app, ["study", *arguments])
+        result = slap("study", *arguments)
         assert result.exit_code == ErrorCode.INVALID_PARAMETER, result.stderr
         return " ".join(result.stderr.split())
 

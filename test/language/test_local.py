@@ -32,7 +32,7 @@ from slap_ros.language.prompts import conversation
 from slap_ros.language.request import Message, Request
 from slap_ros.language.schema import decomposition_schema, operator_schema, reward_schema
 from slap_ros.language.token_model import BLOCK, BlockReader, Logits, TokenModel
-from support.model_answers import SETTINGS
+from support.model_answers import SETTINGS, classes
 from support.paper_problems import peg_in_hole, stow_hammer
 
 LOCAL = replace(SETTINGS, base_url="local:nobody")
@@ -107,7 +107,7 @@ def test_dice_propose_nothing_within_the_budget() -> None:
     with pytest.raises(ProposalRejectedError):
         LanguageProposer(inquiry).operators(peg_in_hole().problem)
     assert budget.attempts == 30
-    assert "syntax" not in log.classes() or log.classes()["syntax"] < 30
+    assert "syntax" not in classes(log) or classes(log)["syntax"] < 30
 
 
 def test_time_ends_an_answer() -> None:

@@ -8,22 +8,17 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
 
-from slap_ros.cli import app
 from slap_ros.errors import ErrorCode
 from support.model_answers import good_script, operator_json
 from support.paper_problems import peg_in_hole, printed_insert
 from support.scripted_server import Step, serving
+from support.slap_command import slap
 
 EXAMPLE = Path(__file__).parent.parent.parent / "examples" / "peg_in_hole"
 PEGS = peg_in_hole()
 TASK = (EXAMPLE / "domain.pddl", EXAMPLE / "problem.pddl")
 REPLAY = f"replay:{EXAMPLE / 'scripted.jsonl'}"
-
-
-def slap(*arguments: object, **environment: str) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in arguments], env=environment)
 
 
 def test_the_example_replays_to_a_plan_that_slap_plan_finds_too(tmp_path: Path) -> None:

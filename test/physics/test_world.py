@@ -30,6 +30,7 @@ from slap_ros.worlds.panda import (
     hand_pose,
 )
 from slap_ros.worlds.simulation_pool import MAX_IDLE
+from support.states import changed
 from support.transitions import HIGH, holding
 
 CLOSE, OPEN = np.eye(8)[7], -np.eye(8)[7]
@@ -313,25 +314,19 @@ def test_the_gripper_does_not_open_into_a_wall():
 # -- scenes that cannot be ----------------------------------------------------------------------
 
 
-def changed(name: str, **features: float) -> State:
-    state = tower()
-    obj = state.layout.object(name)
-    return state.replace({(obj, feature): value for feature, value in features.items()})
-
-
 @pytest.mark.parametrize(
     ("state", "words"),
     [
-        (lambda: changed("T", z=0.06), "T is inside a fixed body"),
-        (lambda: changed("T", x=0.51, y=0.01, z=0.14), "T and C|C and T|B and T|T and B"),
-        (lambda: changed("T", x=np.nan), "features of T are not finite"),
-        (lambda: changed("T", vx=np.inf), "features of T are not finite"),
-        (lambda: changed("T", qw=0.9), "the quaternion of T has length 0.9, not 1"),
-        (lambda: changed("robot", joint4=0.5), "joint 4 = 0.5 rad is not within"),
-        (lambda: changed("robot", finger=0.1), "finger = 0.1 m is not within"),
-        (lambda: changed("T", held=1.0), "T is held, but not where the hand has it"),
+        (lambda: changed(tower(), "T", z=0.06), "T is inside a fixed body"),
+        (lambda: changed(tower(), "T", x=0.51, y=0.01, z=0.14), "T and C|C and T|B and T|T and B"),
+        (lambda: changed(tower(), "T", x=np.nan), "features of T are not finite"),
+        (lambda: changed(tower(), "T", vx=np.inf), "features of T are not finite"),
+        (lambda: changed(tower(), "T", qw=0.9), "the quaternion of T has length 0.9, not 1"),
+        (lambda: changed(tower(), "robot", joint4=0.5), "joint 4 = 0.5 rad is not within"),
+        (lambda: changed(tower(), "robot", finger=0.1), "finger = 0.1 m is not within"),
+        (lambda: changed(tower(), "T", held=1.0), "T is held, but not where the hand has it"),
         (lambda: holding(holding(tower(), "T"), "B"), "holds one body at most, here 2"),
-        (lambda: changed("robot", joint2=1.4), "the arm, or what it holds, is inside"),
+        (lambda: changed(tower(), "robot", joint2=1.4), "the arm, or what it holds, is inside"),
     ],
 )
 def test_impossible_scenes_are_refused_and_change_nothing(world, state, words):
@@ -416,7 +411,7 @@ def test_a_refused_state_takes_no_client():
     simulation_pool.close_idle()
     before = connected()
     with pytest.raises(InvalidStateError):
-        PandaWorld(SCENE, changed("T", z=0.0))
+        PandaWorld(SCENE, changed(tower(), "T", z=0.0))
     assert connected() == before
 
 

@@ -13,9 +13,7 @@ from typing import Any, cast
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from slap_ros.cli import app
 from slap_ros.domains.registry import get_domain
 from slap_ros.errors import ErrorCode, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import build_abstract_graph
@@ -24,6 +22,7 @@ from slap_ros.planning.options import Option, OptionKind
 from slap_ros.relational import GroundOperator, LiftedOperator, ground_operators
 from slap_ros.relational.pddl import parse_domain, parse_problem
 from slap_ros.relational.pddl.grounder import ground_task
+from support.slap_command import slap
 
 Task = tuple[int, int, list[GroundOperator]]  # start, goal, operators
 NOTHING: frozenset[Any] = frozenset()
@@ -74,7 +73,7 @@ def blocks_world(blocks: int, seed: int) -> Task:
     )
     space = problem.atom_space(BLOCKS_WORLD)
     operators = ground_operators(BLOCKS_WORLD.operators, space)
-    return problem.initial_mask(space), problem.goal_mask(space), list(operators)
+    return space.mask(problem.init), space.mask(problem.goal), list(operators)
 
 
 def operator(preconditions: int, add_effects: int, delete_effects: int) -> GroundOperator:
@@ -284,7 +283,7 @@ def plan_files(tmp_path, texts, *options):
     for name, text in zip(("domain.pddl", "problem.pddl"), texts, strict=True):
         (tmp_path / name).write_text(text)
     files = [str(tmp_path / "domain.pddl"), str(tmp_path / "problem.pddl")]
-    return CliRunner().invoke(app, ["plan", *files, *options])
+    return slap("plan", *files, *options)
 
 
 @pytest.mark.parametrize(
@@ -297,7 +296,7 @@ def plan_files(tmp_path, texts, *options):
     ids=["hanoi", "operator", "atoms"],
 )
 def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypatch, texts, advice):
-    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 400_000)  # else minutes
+    monkeypatch.setattr("slap_ros.planning.greedy.MAX_TESTS", 400_000)  # else minutes
     monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_BINDINGS", 20_000)
     monkeypatch.setattr("slap_ros.relational.pddl.grounder.MAX_ATOMS", 5_000)
     result = plan_files(tmp_path, texts)
@@ -305,11 +304,19 @@ def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypa
     assert advice in result.stderr
 
 
-def test_more_effort_goes_further(tmp_path, monkeypatch):
-    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 1_000)
-    assert plan_files(tmp_path, hanoi(4)).exit_code == ErrorCode.PLANNING_LIMIT
-    result = plan_files(tmp_path, hanoi(4), "--effort", "100")
-    assert result.exit_code == 0
+@pytest.mark.parametrize(
+    ("planner", "limit"),
+    [
+        ("anytime", "slap_ros.planning.greedy.MAX_TESTS"),
+        ("astar", "slap_ros.planning.least_cost.MAX_TESTS"),
+    ],
+)
+def test_more_effort_goes_further(tmp_path, monkeypatch, planner, limit):
+    monkeypatch.setattr(limit, 1_000)
+    chosen = ("--planner", planner)
+    assert plan_files(tmp_path, hanoi(4), *chosen).exit_code == ErrorCode.PLANNING_LIMIT
+    result = plan_files(tmp_path, hanoi(4), *chosen, "--effort", "100")
+    assert result.exit_code == 0, result.stderr
     assert "operators" in result.stderr
 
 

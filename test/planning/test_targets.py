@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode, UnsolvableError
+from slap_ros.errors import ErrorCode
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Rollout
@@ -278,8 +278,7 @@ def test_where_everything_fails_the_search_tells_how_far_it_came(search):
     start = State(LAYOUT, [float(AT_START)])
     outcome = search(graph, start, FailingModel())
     assert outcome.plan is None
-    with pytest.raises(UnsolvableError):
-        outcome.require_plan()
+    assert outcome.reason
     found = {str(path.plan.edges[-1]): path for path in outcome.failed}
     assert set(found) == {"stumbles()", "breaks()"}
     assert [str(edge) for edge in found["stumbles()"].plan.edges] == ["walks()", "stumbles()"]

@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans from where operators do not lead to the goal, and skills do."""
 
+from dataclasses import replace
+
 import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import UnsolvableError
-from slap_ros.planning.execution import Executor
+from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.experiment import solve
 from slap_ros.planning.planner import make_planner
-from support.executed import fluent_atoms
+from support.states import fluent_atoms
 
 DOMAIN = get_domain("obstacle_tower", "fair:obstacles=0,distractors=0")
 TASK = DOMAIN.task(0)
@@ -33,14 +36,7 @@ def test_a_block_half_on_the_target_is_picked_up_and_put_down_again(planner):
     on_table = space.bit(space.atom("On", ("block1", "table")))
     room = space.bit(space.atom("NothingOn", ("target",)))
     assert space.abstract(state) & (on_table | room) == on_table
-    episode = Executor(
-        DOMAIN,
-        make_planner(planner, DOMAIN, state),
-        DOMAIN.make_world(state),
-        space,
-        space.mask(TASK.goal),
-        TASK.step_limit,
-    ).run()
+    episode = solve(DOMAIN, replace(TASK, initial_state=state), PURE_PLANNING, planner)
     assert episode.success
     assert episode.replans == 0
     assert [edge.option for edge in episode.edges] == ["Pick", "PlaceInTarget"]
@@ -65,14 +61,8 @@ def test_a_tower_that_leaves_no_room_at_the_target_is_taken_down(planner):
         space = WITH_TOWER.atom_space(state)
         room = space.bit(space.atom("NothingOn", ("target",)))
         rooms.add(bool(space.abstract(state) & room))
-        episode = Executor(
-            WITH_TOWER,
-            make_planner(planner, WITH_TOWER, state),
-            WITH_TOWER.make_world(state),
-            space,
-            space.mask(TOWER.goal),
-            TOWER.step_limit,
-        ).run()
+        task = replace(TOWER, initial_state=state)
+        episode = solve(WITH_TOWER, task, PURE_PLANNING, planner)
         assert episode.success, episode.error
         assert episode.replans == 0
         assert episode.edges[0].option == "Unstack"

@@ -9,14 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.core import Domain, DomainFactory, presets
 from slap_ros.doctor import domains as doctor
 from slap_ros.domains import domain_names, get_domain, preset_names
 from slap_ros.domains.registry import OURS
 from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError
+from support.slap_command import slap
 
 # What a module may do while it is imported, and its `make` when it is called.
 RAISING = {
@@ -126,7 +125,7 @@ def test_commands_go_on_beside_broken_domains(install):
     install({"sweeping": "support.sweeping:make"}, "sound")
     install({"exits": "exits:make"}, "exits", exits="raise SystemExit(7)")
     install({"dies": "dies:make"}, "dies", dies="def make():\n    raise RuntimeError('no GPU')")
-    listed = CliRunner().invoke(app, ["domains", "--json"])
+    listed = slap("domains", "--json")
     assert listed.exit_code == 0
     found = [(one["name"], one["preset"]) for one in json.loads(listed.stdout)]
     ours = [(name, preset) for name in OURS for preset in preset_names(name)]
@@ -139,7 +138,7 @@ def test_commands_go_on_beside_broken_domains(install):
     assert "dies: " in check.found
     assert "no GPU" in check.found
     assert "sweeping" not in check.found
-    planned = CliRunner().invoke(app, ["plan", "dies"])
+    planned = slap("plan", "dies")
     assert planned.exit_code == ErrorCode.INVALID_DOMAIN
     assert "RuntimeError: no GPU" in planned.stderr
 
@@ -156,9 +155,7 @@ def test_a_domain_without_names_of_presets_has_one(install):
     for preset in ("fair", "paper", "default:pucks=3"):
         with pytest.raises(InvalidParameterError, match="default"):
             get_domain("sweeping", preset)
-    run = CliRunner().invoke(
-        app, ["evaluate", "sweeping", "--tasks", "1", "--seeds", "1", "--json"]
-    )
+    run = slap("evaluate", "sweeping", "--tasks", "1", "--seeds", "1", "--json")
     assert run.exit_code == 0
 
 
@@ -180,7 +177,7 @@ def test_presets_have_names_of_their_own_and_the_first_is_the_default(install):
     assert [d.preset for d in made.values()] == ["narrow", "wide", "wide:pucks=3", "narrow"]
     assert dict(made["wide:pucks=3"].configuration) == {"preset": "wide", "pucks": "3"}
     assert made[None] is made["narrow"]
-    listed = CliRunner().invoke(app, ["domains", "--json"]).stdout
+    listed = slap("domains", "--json").stdout
     assert [one["preset"] for one in json.loads(listed) if one["name"] == "stranger"] == [
         "narrow", "wide",
     ]  # fmt: skip

@@ -5,9 +5,7 @@
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.core import Learning
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError, UnsolvableError
@@ -21,6 +19,7 @@ from slap_ros.shortcuts.stopping import Stopping
 from slap_ros.shortcuts.training import Training
 from slap_ros.skills.domain_choice import DomainChoice
 from support import patchy
+from support.slap_command import slap
 
 PATCHY = patchy.make("some")
 WRONG = [
@@ -62,7 +61,7 @@ def test_what_no_setting_can_be_is_refused(text):
 
 
 def test_a_wrong_name_lists_the_right_ones_on_the_command_line():
-    run = CliRunner().invoke(app, ["train", "obstacle2d", "--set", "exploration.rolouts=16"])
+    run = slap("train", "obstacle2d", "--set", "exploration.rolouts=16")
     assert run.exit_code == ErrorCode.INVALID_PARAMETER
     for name in setting_names(TrainingSettings):
         assert name in run.stderr
@@ -162,7 +161,7 @@ def test_a_stage_takes_whole_rollouts_and_the_first_may_be_tried_again(learner, 
 
 def test_steps_that_contradict_themselves_are_refused():
     both = ["--steps", "10", "--set", "ppo.total_steps=10"]
-    run = CliRunner().invoke(app, ["train", "obstacle2d", *both])
+    run = slap("train", "obstacle2d", *both)
     assert run.exit_code == ErrorCode.INVALID_PARAMETER
     assert "give one" in run.stderr
 

@@ -5,9 +5,7 @@
 from dataclasses import dataclass, replace
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import evaluate_bag, read_bag
@@ -17,6 +15,7 @@ from slap_ros.messages.interfaces import PLAN_EVENT
 from slap_ros.planning.planner import make_planner
 from slap_ros.skills.domain_choice import DomainChoice
 from support import patchy, sweeping
+from support.slap_command import slap
 
 OUT_OF_REACH = patchy.make("none")
 # What the skill does is not what its operator promises.
@@ -111,7 +110,7 @@ def test_a_message_stays_short_however_much_failed():
 
 def test_command_line_bag_and_result_say_the_same(install, network, tmp_path):
     install({"patchy": "support.patchy:make"})
-    planned = CliRunner().invoke(app, ["plan", "patchy", "--preset", "none"])
+    planned = slap("plan", "patchy", "--preset", "none")
     assert planned.exit_code == ErrorCode.UNSOLVABLE
     assert CAME_OUT in planned.stderr
     bag = tmp_path / "bag"

@@ -6,9 +6,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.core import task_with_goal
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
@@ -26,6 +24,7 @@ from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.scripted_skill import with_scripts
 from support import untaught
+from support.slap_command import slap
 
 DOMAIN = untaught.make()
 TAUGHT = get_domain("obstacle2d")
@@ -34,10 +33,6 @@ TAUGHT = get_domain("obstacle2d")
 @pytest.fixture
 def installed(install):
     install({"untaught": "support.untaught:make"})
-
-
-def slap(*arguments):
-    return CliRunner().invoke(app, [*arguments])
 
 
 def test_a_choice_of_skills_changes_operators_and_nothing_that_is_perceived(installed):

@@ -184,9 +184,9 @@ def test_problems_are_read_back(
     read = parse_problem(write_problem("p", domain.name, layout.objects, init, goal), parsed)
     assert (read.objects, read.init, read.goal) == (layout, init, goal)
     space = read.atom_space(parsed)
-    assert set(space.decode(read.initial_mask(space))) == init
-    assert set(space.decode(read.goal_mask(space))) == goal
-    assert space.static_truth == read.initial_mask(space) & space.static
+    assert set(space.decode(space.mask(read.init))) == init
+    assert set(space.decode(space.mask(read.goal))) == goal
+    assert space.static_truth == space.mask(read.init) & space.static
 
 
 def test_obstacle2d_is_read_back() -> None:
@@ -225,8 +225,8 @@ def test_problem_of_obstacle2d_grounds_as_the_domain_itself() -> None:
     space = problem.atom_space(domain)
     ours = OBSTACLE2D.ground(SPACE)
     theirs = ground_operators(domain.operators, space)
-    assert problem.initial_mask(space) == SPACE.abstract(TASK.initial_state)
-    assert problem.goal_mask(space) == SPACE.mask(TASK.goal)
+    assert space.mask(problem.init) == SPACE.abstract(TASK.initial_state)
+    assert space.mask(problem.goal) == SPACE.mask(TASK.goal)
     assert list(map(masks, theirs)) == list(map(masks, ours))
 
 
@@ -282,7 +282,7 @@ def test_untyped_text() -> None:
     space = problem.atom_space(domain)
     ground = ground_operators(domain.operators, space)
     assert [str(op) for op in ground] == ["pick(b, r)", "wait()"]
-    assert ground[0].apply(problem.initial_mask(space)) & problem.goal_mask(space)
+    assert ground[0].apply(space.mask(problem.init)) & space.mask(problem.goal)
 
 
 def test_types_descend_from_object_where_it_is_used() -> None:
@@ -650,7 +650,7 @@ def test_an_atom_of_pddl_may_relate_an_object_to_itself() -> None:
     problem = parse_problem(text, domain)
     assert [str(atom) for atom in problem.init] == ["at(a, a)"]
     space = problem.atom_space(domain)
-    assert list(space.decode(problem.initial_mask(space))) == list(problem.init)
+    assert list(space.decode(space.mask(problem.init))) == list(problem.init)
 
 
 def test_an_atom_of_a_world_relates_different_objects() -> None:

@@ -11,14 +11,6 @@ from support.truthful_run import Script, record
 
 
 @pytest.fixture(scope="session")
-def script() -> Script:
-    """A run of Obstacle 2D. Shared: not to be changed."""
-    script = Script(seed=7)
-    script.run()
-    return script
-
-
-@pytest.fixture(scope="session")
 def bags(script: Script, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Recorded runs by what they are. Shared: not to be changed."""
     folder = tmp_path_factory.mktemp("bags")

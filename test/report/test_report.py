@@ -13,9 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.bags import evaluate_bag
 from slap_ros.bags.recording import Recording
 from slap_ros.errors import InvalidParameterError, StorageFullError
@@ -25,6 +23,7 @@ from slap_ros.relational import Type
 from slap_ros.report import check_output, read_report, render, write_page
 from slap_ros.report.traces import robot_series
 from support.page_reader import Page
+from support.slap_command import slap
 from support.staged_runs import HOSTILE, with_markers
 from support.truthful_run import Script, record
 
@@ -36,8 +35,8 @@ def page_of(*bags: Path) -> Page:
     return Page(render([read_report(bag) for bag in bags]))
 
 
-def slap(*arguments: object) -> int:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments]).exit_code
+def exit_code(*arguments: object) -> int:
+    return slap(*arguments).exit_code
 
 
 @pytest.mark.parametrize("name", ["pure", "learned", "hostile", "tower"])
@@ -260,8 +259,8 @@ def test_a_damaged_bag_has_the_exit_code_that_evaluate_has(bags: Bags, tmp_path:
         cut = tmp_path / f"{part}.mcap"
         cut.write_bytes(data[: int(part * len(data))])
         output.unlink(missing_ok=True)
-        code = slap("report", cut, "--output", output)
-        assert code == slap("bag", "evaluate", cut), part
+        code = exit_code("report", cut, "--output", output)
+        assert code == exit_code("bag", "evaluate", cut), part
         codes.add((code, output.exists()))
         if output.exists():
             warnings = " ".join(Page(output.read_text()).texts["p"])
@@ -283,15 +282,15 @@ def test_other_bad_bags_have_the_codes_of_evaluate(
         next(m.message for m in messages if m.type_name == ATOMS).atoms.pop()
     record(tmp_path / "bag", messages)
     output = tmp_path / "page.html"
-    assert slap("report", tmp_path / "bag", "--output", output) == code
-    assert slap("bag", "evaluate", tmp_path / "bag") == code
+    assert exit_code("report", tmp_path / "bag", "--output", output) == code
+    assert exit_code("bag", "evaluate", tmp_path / "bag") == code
     assert output.exists() == (change == "atoms")
 
 
 def test_one_bad_bag_among_good_ones_and_nothing_is_written(bags: Bags, tmp_path: Path) -> None:
     output = tmp_path / "page.html"
     output.write_text("what was there")
-    assert slap("report", bags["pure"], tmp_path / "nowhere", "--output", output) == 90
+    assert exit_code("report", bags["pure"], tmp_path / "nowhere", "--output", output) == 90
     assert output.read_text() == "what was there"
     assert list(tmp_path.iterdir()) == [output]
 
@@ -350,4 +349,4 @@ def test_a_bag_without_a_run_says_so(script: Script, tmp_path: Path) -> None:
     before = [m for m in script.messages if m.topic in ("/slap/domain", "/slap/task")]
     record(tmp_path / "bag", before)
     assert "no run" in page_of(tmp_path / "bag").texts["h1"]
-    assert slap("report", tmp_path / "bag", "--output", tmp_path / "page.html") == 0
+    assert exit_code("report", tmp_path / "bag", "--output", tmp_path / "page.html") == 0

@@ -16,9 +16,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import parse_franka
 from robot_bridge.franka.objects import ModelledObjects
@@ -45,6 +43,7 @@ from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.worlds.features import JOINT_FEATURES
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.panda import HOME
+from support.slap_command import slap
 
 LIMIT = 60.0  # s, far more than anything here takes
 NO_WHEEL = "franky-control and franky-sim are not installed: pip install 'slap_ros[franka-sim]'"
@@ -256,12 +255,12 @@ def test_the_doctor_looks_at_an_arm_and_moves_nothing(arm, simulation):
 
 
 def test_the_doctor_names_what_keeps_it_from_a_robot(simulation):
-    told = CliRunner().invoke(app, ["doctor", "--robot", "ip=127.78.0.5", "--json"])
+    told = slap("doctor", "--robot", "ip=127.78.0.5", "--json")
     assert told.exit_code == 1
     (robot,) = [check for check in json.loads(told.stdout) if check["name"] == "Robot"]
     assert robot["status"] == "problem"
     assert "ROBOT_UNREACHABLE" in robot["found"]
-    wrong = CliRunner().invoke(app, ["doctor", "--robot", "172.16.0.2"])
+    wrong = slap("doctor", "--robot", "172.16.0.2")
     assert wrong.exit_code == ErrorCode.INVALID_PARAMETER
 
 
@@ -336,11 +335,11 @@ def test_no_arm_moves_without_a_yes_and_a_dry_run_needs_no_robot(bag):
         ["bag", "replay", str(bag), "--to", "franka"],
         ["run", "obstacle_tower", "--world", "franka"],
     ):
-        asked = CliRunner().invoke(app, [*command, "--robot", "ip=127.78.0.3"])
+        asked = slap(*command, "--robot", "ip=127.78.0.3")
         assert asked.exit_code == ErrorCode.GOAL_CANCELED
         assert "nothing moved" in asked.stderr
-        assert CliRunner().invoke(app, command).exit_code == ErrorCode.INVALID_PARAMETER
-    dry = CliRunner().invoke(app, ["bag", "replay", str(bag), "--to", "franka", "--dry-run"])
+        assert slap(*command).exit_code == ErrorCode.INVALID_PARAMETER
+    dry = slap("bag", "replay", bag, "--to", "franka", "--dry-run")
     assert dry.exit_code == 0, dry.stderr
     assert "jerk" in dry.stderr
 

@@ -8,20 +8,18 @@ import os
 import pytest
 from builtin_interfaces.msg import Duration
 from control_msgs.action import FollowJointTrajectory, GripperCommand
-from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ensemble.interfaces import JOINT_STATES, SENSOR_DATA, TF
+from ensemble.interfaces import SENSOR_DATA, TF
 from ensemble.robot_parameters import arm_joints
 from ensemble.spinner import temporary_node
 from slap_ros.errors import ErrorCode, InvalidParameterError
+from support.controller_bench import ControllerBench
 
-LIMIT = 60.0  # s, far more than anything here takes
 NO_WHEEL = "franky-control and franky-sim are not installed: pip install 'slap_ros[franka-sim]'"
 JOINTS = arm_joints("fr3")
 
@@ -30,49 +28,20 @@ if "SLAP_FRANKA_SIM_PYTHON" not in os.environ:
     pytest.importorskip("franky_sim", reason=NO_WHEEL)
 
 
-class FrankaLaboratory:
+class FrankaLaboratory(ControllerBench):
     """The driver, and clients of its controllers."""
 
     def __init__(self, node, spinner, driver):
-        self.node, self.spinner, self.driver = node, spinner, driver
-        self.positions, self.frames = {}, set()
-        self.arm = ActionClient(
-            node, FollowJointTrajectory, "fr3_arm_controller/follow_joint_trajectory"
-        )
-        self.gripper = ActionClient(node, GripperCommand, "franka_gripper/gripper_action")
+        super().__init__(node, spinner, "fr3")
+        self.driver, self.frames = driver, set()
         self.recovery = node.create_client(Trigger, "franka_driver/recover")
-        node.create_subscription(JointState, JOINT_STATES.name, self._hear, SENSOR_DATA)
         node.create_subscription(TFMessage, TF.name, self._see, SENSOR_DATA)
-
-    def _hear(self, message):
-        assert len(message.velocity) == len(message.position) == len(message.name)
-        self.positions = dict(zip(message.name, message.position, strict=True))
 
     def _see(self, message):
         self.frames |= {item.child_frame_id for item in message.transforms}
 
-    def until(self, condition):
-        assert self.spinner.spin_until(condition, LIMIT)
-
-    def sent(self, client, goal):
-        self.until(client.server_is_ready)
-        sending = client.send_goal_async(goal)
-        self.until(sending.done)
-        return sending.result()
-
-    def ended(self, handle):
-        ending = handle.get_result_async()
-        self.until(ending.done)
-        return ending.result().result
-
-    def at(self):
-        self.until(lambda: self.positions)
-        return [self.positions[name] for name in JOINTS]
-
     def recover(self):
-        asked = self.recovery.call_async(Trigger.Request())
-        self.until(asked.done)
-        return asked.result().success
+        return self.result(self.recovery.call_async(Trigger.Request())).success
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +57,7 @@ def laboratory(module_network):
             spinner.executor.add_node(driver)
             lab = FrankaLaboratory(node, spinner, driver)
             yield lab
-            lab.arm.destroy()
-            lab.gripper.destroy()
+            lab.destroy()
             spinner.executor.remove_node(driver)
             driver.destroy_node()
 
@@ -134,8 +102,7 @@ def test_a_motion_that_is_canceled_stops_where_it_is(laboratory):
     start = laboratory.at()
     handle = laboratory.sent(laboratory.arm, motion(start, -0.9, seconds=3.0))
     laboratory.until(lambda: abs(laboratory.at()[0] - start[0]) > 0.05)
-    canceling = handle.cancel_goal_async()
-    laboratory.until(canceling.done)
+    laboratory.result(handle.cancel_goal_async())
     laboratory.ended(handle)
     assert abs(laboratory.at()[0] - start[0] + 0.9) > 0.2
 

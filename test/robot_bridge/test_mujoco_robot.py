@@ -9,58 +9,21 @@ import pytest
 from builtin_interfaces.msg import Duration, Time
 from control_msgs.action import FollowJointTrajectory, GripperCommand
 from control_msgs.msg import JointTolerance
-from rclpy.action import ActionClient
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ensemble.cli.run_options import RunOptions
-from ensemble.interfaces import JOINT_STATES, SENSOR_DATA
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import arm_joints, parse_mujoco_robot, parse_robot_bridge
 from ensemble.spinner import temporary_node
 from slap_ros.errors import InvalidParameterError
 from slap_ros.skills.domain_choice import DomainChoice
+from support.controller_bench import ControllerBench
 
 pytest.importorskip("mujoco")
 
-LIMIT = 60.0  # s, far more than anything here takes
 JOINTS = arm_joints("panda")
-
-
-class Laboratory:
-    """Clients of the robot's controllers."""
-
-    def __init__(self, node, spinner):
-        self.node, self.spinner, self.positions = node, spinner, {}
-        self.arm = ActionClient(
-            node, FollowJointTrajectory, "panda_arm_controller/follow_joint_trajectory"
-        )
-        self.gripper = ActionClient(node, GripperCommand, "franka_gripper/gripper_action")
-        node.create_subscription(JointState, JOINT_STATES.name, self._hear, SENSOR_DATA)
-
-    def _hear(self, message):
-        assert len(message.velocity) == len(message.position) == len(message.name)
-        self.positions = dict(zip(message.name, message.position, strict=True))
-
-    def until(self, condition):
-        assert self.spinner.spin_until(condition, LIMIT)
-
-    def sent(self, client, goal):
-        self.until(client.server_is_ready)
-        sending = client.send_goal_async(goal)
-        self.until(sending.done)
-        return sending.result()
-
-    def ended(self, handle):
-        ending = handle.get_result_async()
-        self.until(ending.done)
-        return ending.result().result
-
-    def at(self):
-        self.until(lambda: self.positions)
-        return [self.positions[name] for name in JOINTS]
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +44,9 @@ def made():
         temporary_node(lambda: Node("laboratory")) as (node, spinner),
         InProcessLauncher({"robot_bridge.mujoco": nodes["robot_bridge.mujoco"]}, spinner.executor),
     ):
-        lab = Laboratory(node, spinner)
+        lab = ControllerBench(node, spinner, "panda")
         yield lab
-        lab.arm.destroy()
-        lab.gripper.destroy()
+        lab.destroy()
 
 
 def motion(target, seconds=0.5, names=JOINTS, stamp_s=0, **tolerances):
@@ -147,8 +109,7 @@ def test_a_motion_that_is_canceled_stops_where_it_is(laboratory):
     target = turned(before, 1.0)
     handle = laboratory.sent(laboratory.arm, motion(target, 40.0))
     laboratory.until(lambda: math.dist(laboratory.at(), before) > 0.01)
-    canceling = handle.cancel_goal_async()
-    laboratory.until(canceling.done)
+    laboratory.result(handle.cancel_goal_async())
     laboratory.ended(handle)
     assert math.dist(laboratory.at(), target) > 0.3
 

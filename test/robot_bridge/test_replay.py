@@ -11,9 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rclpy
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import read_bag
@@ -25,6 +23,7 @@ from slap_ros.robot.limits import FR3, PANDA, Limits, Workspace
 from slap_ros.robot.recorded_motion import read_recorded_motion
 from slap_ros.robot.robot_world import GripperAction
 from slap_ros.skills.domain_choice import DomainChoice
+from support.slap_command import slap
 
 QUICK = "pace=20,rate=200,latency=0.01"
 PATIENT = "joint_timeout=60,controller_timeout=60,start_timeout=60"
@@ -45,13 +44,13 @@ def bag(tmp_path_factory, module_network):
     return folder
 
 
-def slap(*arguments):
+def replay(*arguments):
     """Exit code, stdout and stderr."""
-    result = CliRunner().invoke(app, ["bag", "replay", *map(str, arguments)])
+    result = slap("bag", "replay", *arguments)
     return result.exit_code, result.stdout, " ".join(result.stderr.split())
 
 
-def slap_alone(*arguments):
+def replay_alone(*arguments):
     """The same, in a process of its own: a mock robot writes to a real stderr."""
     command = [sys.executable, "-m", "ensemble.cli", "bag", "replay", *map(str, arguments)]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=200)
@@ -136,12 +135,12 @@ def test_a_slower_arm_takes_longer_and_has_its_own_limits(bag):
 
 
 def test_a_dry_run_says_all_of_it_and_moves_nothing(bag):
-    code, out, told = slap(bag, "--to", "robot", "--dry-run", "--json")
+    code, out, told = replay(bag, "--to", "robot", "--dry-run", "--json")
     assert code == 0, told
     data = json.loads(out)
     assert data["steps"] == len(recorded_joints(bag)) - 1
     assert data["violations"] == []
-    code, _, told = slap(
+    code, _, told = replay(
         bag, "--to", "robot", "--dry-run", "--robot", "workspace=.2 -.5 .2 .8 .5 .9"
     )
     assert code == 72
@@ -150,14 +149,16 @@ def test_a_dry_run_says_all_of_it_and_moves_nothing(bag):
 
 
 def test_nothing_moves_unless_somebody_says_so(bag):
-    code, _, told = slap(bag, "--to", "robot")
+    code, _, told = replay(bag, "--to", "robot")
     assert code == 34
     assert "nothing moved" in told
 
 
 @pytest.mark.slow
 def test_the_mock_robot_does_what_was_recorded(network, bag):
-    code, out, told = slap_alone(bag, "--to", "mock", "--mock", QUICK, "--robot", PATIENT, "--json")
+    code, out, told = replay_alone(
+        bag, "--to", "mock", "--mock", QUICK, "--robot", PATIENT, "--json"
+    )
     assert code == 0, told
     data = json.loads(out)
     assert data["played"] == data["steps"]
@@ -170,7 +171,7 @@ def test_another_start_is_refused(network, bag, tmp_path):
     """The same recording from a moment later: neither arm nor blocks are there."""
     late = tmp_path / "late"
     cut(bag, late, first=6)
-    code, _, told = slap_alone(late, "--to", "mock", "--mock", QUICK, "--robot", PATIENT)
+    code, _, told = replay_alone(late, "--to", "mock", "--mock", QUICK, "--robot", PATIENT)
     assert code == 95
     assert "rad off where the recording begins" in told
 
@@ -178,7 +179,7 @@ def test_another_start_is_refused(network, bag, tmp_path):
 @pytest.mark.slow
 def test_a_controller_that_fails_ends_the_replay(network, bag):
     mock = f"{QUICK},fault=abort,fault_after=3"
-    code, _, told = slap_alone(bag, "--to", "mock", "--mock", mock, "--robot", PATIENT)
+    code, _, told = replay_alone(bag, "--to", "mock", "--mock", mock, "--robot", PATIENT)
     assert code == 74, told
     assert "steps executed" not in told
 
@@ -187,7 +188,7 @@ def test_a_controller_that_fails_ends_the_replay(network, bag):
 def test_an_object_that_is_not_there_is_named_before_anything_moves(network, bag):
     mock = f"{QUICK},hidden=block2"
     settings = "joint_timeout=60,controller_timeout=60,start_timeout=8"
-    code, _, told = slap_alone(bag, "--to", "mock", "--mock", mock, "--robot", settings)
+    code, _, told = replay_alone(bag, "--to", "mock", "--mock", mock, "--robot", settings)
     assert code == 77
     assert "not detected at the start: block2" in told
 
@@ -196,7 +197,7 @@ def test_a_robot_that_a_bridge_commands_is_left_alone(network, bag):
     rclpy.init()
     bridge = rclpy.create_node("robot_bridge")
     try:
-        code, _, told = slap_alone(bag, "--to", "robot", "--yes")
+        code, _, told = replay_alone(bag, "--to", "robot", "--yes")
     finally:
         bridge.destroy_node()
         rclpy.shutdown()
@@ -237,7 +238,7 @@ def test_a_domain_without_an_arm_is_refused(network, tmp_path):
 
 def test_options_for_a_robot_are_refused_elsewhere(bag):
     for wrong in (["--dry-run"], ["--to", "moon"], ["--to", "robot", "--mock", "pace=2"]):
-        code, _, told = slap(bag, *wrong)
+        code, _, told = replay(bag, *wrong)
         assert code == 15, told
 
 

@@ -16,7 +16,8 @@ import slap_ros
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
-from slap_ros.evaluation.experiment import Experiment, run_all
+from slap_ros.evaluation.experiment import Experiment, run_with
+from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.problem import Problem
@@ -249,7 +250,7 @@ def test_the_shipped_shortcut_halves_what_the_drawer_takes():
     library = chosen_library(None, domain)
     given, *_, learned = approaches(library, DEFAULT)
     alone, together = (
-        next(iter(run_all(Experiment(domain, 1, 1, 0, "lazy"), approach, 1)))
+        next(run_with(SequentialWorkers(), Experiment(domain, 1, 1, 0, "lazy"), approach))
         for approach in (given, learned)
     )
     assert alone.success and together.success

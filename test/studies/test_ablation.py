@@ -6,14 +6,13 @@ import json
 from dataclasses import fields
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.domains import domain_names, get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.policies.learner_interface import learner_interface, without
-from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts import learning_attempt
 from slap_ros.studies.slap import ablation
+from support.slap_command import slap
 
 PLAIN = "all of them (plain)"
 SMALL = ["--trainings", "1", "--steps", "4096", "--tasks", "1", "--samples", "2"]
@@ -49,9 +48,7 @@ def test_a_term_that_is_not_there():
 
 
 def study(output, domain, *more):
-    result = CliRunner().invoke(
-        app, ["study", "ablation", domain, "--output", str(output), *SMALL, *more]
-    )
+    result = slap("study", "ablation", domain, "--output", output, *SMALL, *more)
     return result.exit_code, " ".join(result.stderr.split())
 
 
@@ -74,7 +71,7 @@ def test_what_cannot_be_studied_is_refused_before_anything_is_learned(tmp_path, 
 @pytest.mark.slow
 @pytest.mark.timeout(180)  # explores, and trains twice
 def test_a_study_that_was_killed_goes_on(tmp_path, monkeypatch):
-    learn, learned = jobs.learn, []
+    learn, learned = learning_attempt.learn, []
 
     def killed(attempt, **options):
         if learned:
@@ -84,7 +81,7 @@ def test_a_study_that_was_killed_goes_on(tmp_path, monkeypatch):
 
     terms = ["--term", ablation.NOTHING, "--term", PLAIN]
     with monkeypatch.context() as patch:
-        patch.setattr(jobs, "learn", killed)
+        patch.setattr(learning_attempt, "learn", killed)
         assert study(tmp_path, "obstacle2d", *terms)[0] != 0
     assert not (tmp_path / "ablation_obstacle2d.json").exists()
     code, complaint = study(tmp_path, "obstacle2d")
@@ -95,7 +92,7 @@ def test_a_study_that_was_killed_goes_on(tmp_path, monkeypatch):
         learned.append(attempt.distribution.domain.term)
         return learn(attempt, **options)
 
-    monkeypatch.setattr(jobs, "learn", counted)
+    monkeypatch.setattr(learning_attempt, "learn", counted)
     assert study(tmp_path, "obstacle2d", *terms)[0] == 0
     assert learned == [ablation.NOTHING, PLAIN]
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]

@@ -9,12 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode
 from slap_ros.learning.workers import SequentialWorkers
 from support.marks import slow
+from support.slap_command import slap
 from support.study_helpers import without_seconds
 
 FOLDER = Path(__file__).parent
@@ -57,8 +56,8 @@ def command(name, output):
     return ["study", name, "obstacle2d", *STUDIES[name], "--output", str(output)]
 
 
-def slap(name, output):
-    result = CliRunner().invoke(app, command(name, output))
+def made(name, output):
+    result = slap(*command(name, output))
     return result.exit_code, " ".join(result.stderr.split())
 
 
@@ -92,10 +91,10 @@ def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(tmp_path, name, do
     (log,) = killed.iterdir()  # no page, not even half of one
     assert log.name == f".{name}_obstacle2d.jsonl"
     assert len(log.read_text().splitlines()) == 1 + DONE + 1
-    assert slap(name, whole)[0] == 0
+    assert made(name, whole)[0] == 0
     everything = sum(done)
     done.clear()
-    assert slap(name, killed)[0] == 0
+    assert made(name, killed)[0] == 0
     assert sum(done) == everything - DONE > 0
     one, other = data_of(name, killed), data_of(name, whole)
     assert without_seconds(one) == without_seconds(other)
@@ -137,25 +136,25 @@ def test_what_cannot_be_gone_on_with_is_refused_and_left_as_it_is(log):
         text = "".join(f"{line}\n" for line in lines)
         for ending in ("", "cut off"):
             log.write_text(text + ending)
-            code, complaint = slap("goals", log.parent)
+            code, complaint = made("goals", log.parent)
             assert code == ErrorCode.INVALID_PARAMETER
             assert said in complaint
             assert "remove" in complaint
             if "damaged" not in said:
                 assert log.read_text() == text + ending
     log.write_bytes(b"\xff\xfe\n")
-    assert "is no log of a study" in slap("goals", log.parent)[1]
+    assert "is no log of a study" in made("goals", log.parent)[1]
     assert list(log.parent.iterdir()) == [log]
 
 
 def test_a_study_that_was_killed_as_it_wrote_the_first_line_begins_again(log):
     log.write_text(log.read_text()[:40])
-    assert slap("goals", log.parent)[0] == 0
+    assert made("goals", log.parent)[0] == 0
     assert not log.exists()
 
 
 def test_a_folder_in_place_of_a_log_is_refused(tmp_path):
     (tmp_path / ".goals_obstacle2d.jsonl").mkdir()
-    code, complaint = slap("goals", tmp_path)
+    code, complaint = made("goals", tmp_path)
     assert code != 0
     assert "a folder, where a file is expected" in complaint

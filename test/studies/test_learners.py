@@ -7,11 +7,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode
 from slap_ros.studies.slap.learners import learner_of
+from support.slap_command import slap
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 
@@ -19,7 +18,7 @@ LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 def learners(domain, output, folders):
     arguments = ["study", "learners", domain, "--output", str(output), "--tasks", "2"]
     arguments += [part for folder in folders for part in ("--library", str(folder))]
-    result = CliRunner().invoke(app, [*arguments, "--seeds", "1", "--samples", "2"])
+    result = slap(*arguments, "--seeds", "1", "--samples", "2")
     return result.exit_code, " ".join(result.stderr.split())
 
 

@@ -7,9 +7,7 @@ from itertools import chain, repeat
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING
@@ -19,6 +17,7 @@ from slap_ros.studies.comparison import PlanningSetup
 from slap_ros.studies.slap import noisy_predicates
 from slap_ros.studies.slap.noisy_predicates import RANGES, DrawnThresholds, ThresholdRange
 from slap_ros.studies.slap.varying_thresholds import VaryingExecutor, foresee
+from support.slap_command import slap
 
 SETUP = PlanningSetup(DomainChoice("cluttered_drawer", "fair:obstacles=4"), "lazy", PURE_PLANNING)
 DOMAIN = SETUP.make_domain()
@@ -129,7 +128,7 @@ def test_the_page_has_the_papers_figures_beside_ours(tmp_path, monkeypatch):
     monkeypatch.setattr(noisy_predicates, "RANGES", RANGES[2:3])
     arguments = ["study", "noisy_predicates", "cluttered_drawer", "--tasks", "1", "--seeds", "1"]
     arguments += ["--samples", "1", "--preset", "fair:obstacles=1", "--output", str(tmp_path)]
-    result = CliRunner().invoke(app, arguments)
+    result = slap(*arguments)
     assert result.exit_code == 0, result.stderr
     data = json.loads((tmp_path / "noisy_predicates_cluttered_drawer.json").read_text())
     rows = {row["approach"]: row for row in data["found"]["rows"]}
@@ -143,7 +142,7 @@ def test_the_page_has_the_papers_figures_beside_ours(tmp_path, monkeypatch):
 
 def test_a_domain_without_such_a_threshold_is_refused(tmp_path):
     arguments = ["study", "noisy_predicates", "obstacle2d", "--output", str(tmp_path)]
-    result = CliRunner().invoke(app, arguments)
+    result = slap(*arguments)
     assert result.exit_code == InvalidParameterError.code
     assert "this study is of cluttered_drawer" in " ".join(result.stderr.split())
     assert not list(tmp_path.iterdir())

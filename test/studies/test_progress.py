@@ -6,15 +6,14 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.baselines.trained_baseline import TrainedBaseline, save_baseline
 from slap_ros.baselines.training_envs import as_observed
 from slap_ros.environments.registration import make_task_env
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.studies.lg_sail.progress import MeasuredTraining
 from slap_ros.studies.registry import STUDIES
+from support.slap_command import slap
 
 pytest.importorskip("matplotlib")
 STAGES = {"obs": "dict", "control": "joints", "reward": "stages"}
@@ -42,7 +41,7 @@ def baseline(folder, features, method="sac", preset="fair", **record):
 
 def study(*arguments):
     command = ["study", "progress", "stack_at_target", "--tasks", 2, "--goal", "training"]
-    return CliRunner().invoke(app, [str(word) for word in (*command, *arguments)])
+    return slap(*command, *arguments)
 
 
 def test_who_holds_still_does_nothing_and_skills_do_all_stages(tmp_path, features):

@@ -3,13 +3,12 @@
 """What a retrieved skill is worth in the place of another one, and what the study refuses."""
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode
 from slap_ros.skills.domain_choice import NO_SKILLS, DomainChoice, open_domain
 from slap_ros.studies.lg_sail.acquisition import learned_skills
 from slap_ros.studies.lg_sail.retrieval import Known, try_in_place
+from support.slap_command import slap
 
 PEGS = DomainChoice("peg_in_hole", "fair:clearance=5")
 
@@ -40,7 +39,7 @@ def test_where_a_domain_has_no_skill_none_is_tried():
     ],
 )
 def test_what_cannot_be_compared_is_refused(arguments, said, tmp_path):
-    ran = CliRunner().invoke(app, ["study", "retrieval", *arguments, "--output", str(tmp_path)])
+    ran = slap("study", "retrieval", *arguments, "--output", tmp_path)
     assert ran.exit_code in (ErrorCode.INVALID_PARAMETER, ErrorCode.LANGUAGE_UNAVAILABLE)
     assert said in " ".join(ran.stderr.split())
     assert not list(tmp_path.iterdir())

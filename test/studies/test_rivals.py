@@ -6,19 +6,18 @@ import json
 import shutil
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.api.baselines import train_baseline
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
+from support.slap_command import slap
 from support.study_helpers import in_this_process
 
 SHORT = {"n_envs": 2, "n_steps": 16, "batch_size": 16, "validation": 1}
 
 
 def rivals(domain, *arguments):
-    result = CliRunner().invoke(app, ["study", "rivals", domain, *map(str, arguments)])
+    result = slap("study", "rivals", domain, *arguments)
     return result.exit_code, " ".join(result.stderr.split())
 
 

@@ -5,10 +5,9 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.studies.registry import STUDIES
+from support.slap_command import slap
 
 pytest.importorskip("matplotlib")
 GOALS = ("task0", "task1", "task2")
@@ -43,7 +42,7 @@ def sequence(folder, steps, solved, scratch=False, **changes):
 
 def study(*arguments):
     command = ["study", "sequence", "groceries", *arguments]
-    return CliRunner().invoke(app, [str(argument) for argument in command])
+    return slap(*command)
 
 
 def test_later_goals_are_compared_with_the_first_and_forgetting_shows(tmp_path):

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import COMMANDS, app
+from ensemble.cli.application import COMMANDS
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
@@ -35,6 +34,7 @@ from slap_ros.studies.slap import perception, pruning
 from slap_ros.studies.slap.trainings import TrainingFolder, read_curve
 from slap_ros.studies.slap.variations import Variation, offered, parse_variation
 from slap_ros.studies.study_log import StudyLog
+from support.slap_command import slap
 from support.study_helpers import without_seconds
 
 PUBLISHED = Path(__file__).parent.parent.parent / "docs" / "results"
@@ -48,14 +48,14 @@ ALONE = ["--shortcuts", "none"]  # learning curves alone
 def study(folder, *arguments):
     """Make a study; its data."""
     name, domain, *_ = arguments
-    result = CliRunner().invoke(app, ["study", *map(str, arguments), "--output", str(folder)])
+    result = slap("study", *arguments, "--output", folder)
     assert result.exit_code == 0, result.stderr
     return json.loads((folder / f"{name}_{domain}.json").read_text())
 
 
 def refusal(*arguments):
     """How a study is refused: exit code and message."""
-    result = CliRunner().invoke(app, ["study", *map(str, arguments)])
+    result = slap("study", *arguments)
     return result.exit_code, " ".join(result.stderr.split())
 
 
@@ -96,7 +96,7 @@ def test_a_task_without_a_plan_counts_as_failed_and_is_told_of(tmp_path, monkeyp
     monkeypatch.setattr(GraphPlanner.__init__, "__defaults__", (*others, 9))
     arguments = ["generalisation", "obstacle2d", "--tasks", 1, "--seeds", 3, *PLANNING]
     arguments += ["--vary", "bystanders=0,1", "--output", tmp_path]
-    result = CliRunner().invoke(app, ["study", *map(str, arguments)])
+    result = slap("study", *arguments)
     assert result.exit_code == 0, result.stderr
     assert "slap: seed 0, task 0 not solved: more than 9 abstract states" in result.stderr
     data = json.loads((tmp_path / "generalisation_obstacle2d.json").read_text())

@@ -6,15 +6,14 @@ import json
 import sys
 
 import pytest
-from typer.testing import CliRunner
 
-from ensemble.cli.application import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import PlanningSetup
 from slap_ros.studies.slap.transfer import OTHER, OWN, solve_in_mujoco
+from support.slap_command import slap
 
 pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")
@@ -24,9 +23,7 @@ SMALL += ["--first-seed", "1", "--samples", "1"]
 
 
 def study(output, *more):
-    return CliRunner().invoke(
-        app, ["study", "transfer", "obstacle_tower", "--output", str(output), *SMALL, *more]
-    )
+    return slap("study", "transfer", "obstacle_tower", "--output", output, *SMALL, *more)
 
 
 def test_a_robot_that_holds_after_a_fault_has_not_solved_its_task(monkeypatch):

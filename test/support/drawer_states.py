@@ -25,12 +25,6 @@ def put(state: State, name: str, pose: Pose) -> State:
     return state.replace({(obj, axis): v for axis, v in zip(POSE_NAMES, values, strict=True)})
 
 
-def changed(state: State, name: str, **features: float) -> State:
-    """The state with other features of an object."""
-    obj = state.layout.object(name)
-    return state.replace({(obj, feature): value for feature, value in features.items()})
-
-
 def carry_out(world: World, policy: Policy) -> State:
     """Follow a policy to its end."""
     while (action := policy(world.state)) is not None:

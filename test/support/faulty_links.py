@@ -6,19 +6,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from random import Random
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from slap_msgs.srv import ResetTask
 
 from ensemble.client import RunClient
-from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, LATCHED, RESET_TASK, STATE, TASK
+from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, LATCHED, STATE, TASK
 from ensemble.nodes import RunSettings, node_class, node_parameters
-from ensemble.spinner import Spinner
 from slap_ros.skills.domain_choice import DomainChoice
+from support.bench import EnsembleBench, one_executor
 
-LIMIT = 120.0  # s, within which every case must have ended, on a loaded machine too
 HEARD = {
     "perception_node": (DOMAIN, TASK, STATE),
     "skill_server": (DOMAIN, TASK, STATE, ATOMS),
@@ -175,33 +171,12 @@ def faulty_name(receiver, topic):
     return f"faulty/{receiver}/{topic.name}"
 
 
-class Laboratory:
+class FaultyEnsemble(EnsembleBench):
     """The ensemble, a client and the relay, on one executor."""
 
     def __init__(self, client, spinner, relay):
-        self.client, self.spinner, self.relay = client, spinner, relay
-
-    def solve(self, episode=0):
-        """The result of asking for the task to be solved."""
-        sent = self.client.send((), 0, 2, episode)
-        assert self.spinner.spin_until(sent.done, LIMIT)
-        result = sent.result().get_result_async()
-        assert self.spinner.spin_until(result.done, LIMIT), "hung"
-        return result.result().result
-
-    def close_bag(self):
-        closed = self.client.close_bag()
-        assert self.spinner.spin_until(closed.done, LIMIT)
-
-    def reset(self, seed):
-        """Open a new episode; its number."""
-        service = self.client.create_client(RESET_TASK.type, RESET_TASK.name)
-        assert self.spinner.spin_until(service.service_is_ready, LIMIT)
-        answer = service.call_async(ResetTask.Request(seed=seed))
-        assert self.spinner.spin_until(answer.done, LIMIT)
-        self.client.destroy_client(service)
-        assert answer.result().error_code == 0
-        return answer.result().episode
+        super().__init__(client, spinner)
+        self.relay = relay
 
 
 @contextmanager
@@ -210,24 +185,17 @@ def laboratory(case, bag):
     settings = RunSettings(
         DomainChoice("obstacle2d", "fair"), case.seed, 0, "lazy", bag, shortcuts="none"
     )
-    rclpy.init()
-    executor, nodes = SingleThreadedExecutor(), []
-    try:
+    with one_executor() as (nodes, spinner):
         nodes.append(client := RunClient(lambda *_: None))
         nodes.append(relay := Relay(case.receiver, case.topic, case.fault, Random(case.seed)))
         for name, parameters in node_parameters(settings).items():
             heard = [case.topic] if name == case.receiver else []
             nodes.append(_node(name, {**parameters, **IMPATIENT.get(name, {})}, heard))
         for node in nodes:
-            executor.add_node(node)
-        spinner = Spinner(executor)
-        assert spinner.spin_until(lambda: client.ready(True), LIMIT)
-        yield Laboratory(client, spinner, relay)
-    finally:
-        for node in reversed(nodes):
-            node.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
+            spinner.executor.add_node(node)
+        bench = FaultyEnsemble(client, spinner, relay)
+        bench.until(lambda: client.ready(True))
+        yield bench
 
 
 def _node(name, parameters, relayed):

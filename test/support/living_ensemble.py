@@ -4,16 +4,14 @@
 
 from contextlib import contextmanager
 
-from slap_msgs.srv import ResetTask
-
 from ensemble.client import RunClient
-from ensemble.interfaces import ATOMS, PLAN_EVENTS, RESET_TASK, SKILL_EVENTS, STATE
+from ensemble.interfaces import ATOMS, PLAN_EVENTS, SKILL_EVENTS, STATE
 from ensemble.launcher import ProcessLauncher
 from ensemble.node_liveness import NodeLiveness
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.skills.domain_choice import DomainChoice
-from support.process_faults import LIMIT
+from support.bench import EnsembleBench
 
 # By which a node is told from its successor.
 PUBLISHED = {
@@ -24,11 +22,12 @@ PUBLISHED = {
 }
 
 
-class Laboratory:
+class LivingEnsemble(EnsembleBench):
     """An ensemble whose nodes come and go, and a client."""
 
     def __init__(self, nodes, client, spinner, heard):
-        self.nodes, self.client, self.spinner, self.heard = nodes, client, spinner, heard
+        super().__init__(client, spinner)
+        self.nodes, self.heard = nodes, heard
         self._launchers = {}
 
     def start(self, name, **changed):
@@ -57,25 +56,6 @@ class Laboratory:
         for launcher in self._launchers.values():
             launcher.__exit__(None, None, None)
 
-    def until(self, condition):
-        """Wait for something that must come."""
-        assert self.spinner.spin_until(condition, LIMIT), "hung"
-
-    def ask(self, episode=0):
-        """Ask for the task to be solved; the future result."""
-        sent = self.client.send((), 0, 2, episode)
-        self.until(sent.done)
-        return sent.result().get_result_async()
-
-    def reset(self, seed):
-        """Open a new episode; its number."""
-        service = self.client.create_client(RESET_TASK.type, RESET_TASK.name)
-        self.until(service.service_is_ready)
-        answer = service.call_async(ResetTask.Request(seed=seed))
-        self.until(answer.done)
-        self.client.destroy_client(service)
-        return answer.result().episode
-
 
 @contextmanager
 def laboratory(seed, bag, pace, patience=1.0):
@@ -96,7 +76,7 @@ def laboratory(seed, bag, pace, patience=1.0):
         return RunClient(lambda type_name, message: heard.append((type_name, message)))
 
     with temporary_node(client_node) as (client, spinner):
-        bench = Laboratory(node_parameters(settings), client, spinner, heard)
+        bench = LivingEnsemble(node_parameters(settings), client, spinner, heard)
         try:
             for name in bench.nodes:
                 bench.start(name)

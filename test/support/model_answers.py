@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -115,6 +116,11 @@ def good_script(printed: Printed, **replaced: Sequence[Step | str]) -> Script:
     return script
 
 
+def classes(log: AttemptLog) -> Counter[str]:
+    """The number of entries with each class of complaint, warnings too."""
+    return Counter(name for entry in log.entries for name in entry.get("errors", ()))
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What came of a script."""
@@ -126,7 +132,7 @@ class Outcome:
 
     @property
     def classes(self) -> Mapping[str, int]:
-        return self.log.classes()
+        return classes(self.log)
 
 
 def run(

@@ -1,10 +1,20 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the kernel says of a process that a test has started."""
+"""What the kernel says of a process that a test has started, and waiting for it."""
 
 import re
 import signal
+import time
 from pathlib import Path
+
+LIMIT = 120.0  # s, far more than anything here takes
+
+
+def wait_until(condition):
+    end = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
 
 
 def handles_signals(pid):

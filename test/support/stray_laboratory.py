@@ -5,28 +5,25 @@
 from contextlib import contextmanager
 from functools import partial
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from ensemble.client import RunClient
 from ensemble.interfaces import ATOMS, DIAGNOSTICS, DOMAIN, FAULT, STATE, TASK
 from ensemble.nodes import RunSettings, node_class, node_parameters
-from ensemble.spinner import Spinner
 from slap_ros.skills.domain_choice import DomainChoice
-from support.faulty_links import Laboratory
+from support.bench import EnsembleBench, one_executor
 
-LIMIT = 120.0  # s, far more than anything here takes
 LISTENERS = ("/perception_node", "/planner_node", "/skill_server")
 HEARD_BY = {DOMAIN.name: 6, TASK.name: 6, STATE.name: 6, ATOMS.name: 5, FAULT.name: 4}  # nodes
 
 
-class StrayLaboratory(Laboratory):
+class StrayLaboratory(EnsembleBench):
     """An ensemble, and a publisher that does not belong to it."""
 
-    def __init__(self, client, spinner):
-        super().__init__(client, spinner, relay=None)
+    def __init__(self, client, spinner, nodes):
+        super().__init__(client, spinner)
+        self.nodes = nodes
         self.newest, self.health = dict.fromkeys((FAULT.name,)), {}
         for topic in (DOMAIN, TASK, STATE, ATOMS, FAULT):
             client.create_subscription(
@@ -53,8 +50,8 @@ class StrayLaboratory(Laboratory):
     def episode_from(self, seed):
         """A new episode, of which every topic has been heard."""
         episode = self.reset(seed)
-        assert self.spinner.spin_until(
-            lambda: all(self.newest[t.name].episode == episode for t in (TASK, STATE, ATOMS)), LIMIT
+        self.until(
+            lambda: all(self.newest[t.name].episode == episode for t in (TASK, STATE, ATOMS))
         )
         return episode
 
@@ -65,11 +62,11 @@ class StrayLaboratory(Laboratory):
         stray = self.client.create_publisher(topic.type, topic.name, topic.qos)
         # Heard by this client, the recorder, and whoever acts on it.
         reached = HEARD_BY[topic.name]
-        assert self.spinner.spin_until(lambda: stray.get_subscription_count() >= reached, LIMIT)
+        self.until(lambda: stray.get_subscription_count() >= reached)
         stray.publish(message)
-        assert self.spinner.spin_until(lambda: self.newest[topic.name] == message, LIMIT)
+        self.until(lambda: self.newest[topic.name] == message)
         if kind is not None:
-            assert self.spinner.spin_until(lambda: self.more_refused(kind, before), LIMIT)
+            self.until(lambda: self.more_refused(kind, before))
         try:
             yield
         finally:
@@ -81,23 +78,13 @@ def laboratory(bag):
     settings = RunSettings(
         DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", bag, shortcuts="none", patience=5.0
     )
-    rclpy.init()
-    executor, nodes = SingleThreadedExecutor(), []
-    try:
+    with one_executor() as (nodes, spinner):
         nodes.append(client := RunClient(lambda *_: None))
-        bench = StrayLaboratory(client, Spinner(executor))
+        bench = StrayLaboratory(client, spinner, nodes)
         for name, parameters in node_parameters(settings).items():
             overrides = [Parameter(key, value=value) for key, value in parameters.items()]
             nodes.append(node_class(name)(parameter_overrides=overrides))
         for node in nodes:
-            executor.add_node(node)
-        assert bench.spinner.spin_until(
-            lambda: client.ready(True) and len(bench.newest) == 5, LIMIT
-        )
-        bench.nodes = nodes
+            spinner.executor.add_node(node)
+        bench.until(lambda: client.ready(True) and len(bench.newest) == 5)
         yield bench
-    finally:
-        for node in reversed(nodes):
-            node.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()

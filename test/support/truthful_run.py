@@ -245,7 +245,8 @@ class Script:
         )
         graph = build_abstract_graph(self.space.abstract(state), self.space.mask(goal), operators)
         outcome = search_lazily(graph, state, model)
-        plan = outcome.require_plan()
+        plan = outcome.plan
+        assert plan is not None, outcome.reason
         self.clock_ns += 123_456_789
         self.plan_event(PlanEventKind.PLANNED, 0, rolled=model.executed)
         self.truth.planning_ns = self.clock_ns - started

@@ -20,7 +20,7 @@ def skill_record(
     progress: SkillProgress,
     vacuity: Mapping[str, Any] | None,
     seed: int,
-    compared: KnownOrLearned | None = None,
+    compared: KnownOrLearned | None,
 ) -> dict[str, Any]:
     """The record of a skill that was trained.
 

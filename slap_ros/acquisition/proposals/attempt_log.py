@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -113,10 +112,6 @@ class AttemptLog:
                 "left": budget.left(),
             }
         )
-
-    def classes(self) -> Counter[str]:
-        """The number of entries with each class of complaint, warnings too."""
-        return Counter(name for entry in self.entries for name in entry.get("errors", ()))
 
     def _add(self, entry: Entry) -> None:
         self.entries.append(entry)

@@ -136,7 +136,7 @@ class ProposalRequest:
         return propose(self.problem, self._proposer(inquiry), self._rewarder(inquiry))
 
     def make_rewards(
-        self, operators: Sequence[LiftedOperator], inquiry: Inquiry | None = None
+        self, operators: Sequence[LiftedOperator], inquiry: Inquiry | None
     ) -> Templates:
         """Rewards alone, for operators that are there already.
 

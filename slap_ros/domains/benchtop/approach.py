@@ -138,7 +138,7 @@ def begin_at(
     objects: tuple[Object, ...],
     goal: HandGoal,
     outwards: Vector,
-    turned: tuple[float, float] = STRAIGHT,
+    turned: tuple[float, float],
 ) -> HandGoal:
     """Where a skill begins: before where it acts, somewhat aside, and turned if need be.
 

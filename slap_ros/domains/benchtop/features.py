@@ -53,9 +53,7 @@ def thing_features(pose: Pose, rest_height: float, support_height: float) -> Map
     return {**body_features(*pose), **sizes}
 
 
-def jointed_features(
-    pose: Pose, opening: float = 0.0, support_height: float = 0.0
-) -> Mapping[str, float]:
+def jointed_features(pose: Pose, opening: float, support_height: float) -> Mapping[str, float]:
     """The features of a drawer or a lid that does not move, for ``State.build``.
 
     Args:

@@ -55,7 +55,7 @@ def operator_question(
     predicates: Sequence[Predicate],
     init: Iterable[GroundAtom],
     goal: Iterable[GroundAtom],
-    described: Sequence[LiftedOperator] = (),
+    described: Sequence[LiftedOperator],
 ) -> str:
     """What an action needs and changes (LG-SAIL B.2).
 
@@ -89,7 +89,7 @@ def reward_question(
     operator: LiftedOperator,
     metrics: Sequence[Metric],
     predicates: Sequence[Predicate],
-    with_definitions: bool = True,
+    with_definitions: bool,
 ) -> str:
     """Which metrics lead a learner to an operator's effects (LG-SAIL C.1).
 

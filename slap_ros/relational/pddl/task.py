@@ -196,11 +196,3 @@ class PddlProblem:
             self.init.__contains__,
             one_object_twice=True,
         )
-
-    def initial_mask(self, space: AtomSpace) -> int:
-        """The abstract state to start from."""
-        return space.mask(self.init)
-
-    def goal_mask(self, space: AtomSpace) -> int:
-        """The atoms that shall hold in the end."""
-        return space.mask(self.goal)

@@ -58,11 +58,12 @@ class ExactDetector:
     Args:
         domain: Domain with a Panda.
         initial: State of a task, in which the plant begins.
-        period_s: Time between two detections, s.
     """
 
-    def __init__(self, domain: Domain, initial: State, period_s: float = 1.0 / 30.0) -> None:
-        self.plant, self.period_s = MujocoPlant.of(domain, initial), period_s
+    period_s = 1.0 / 30.0
+
+    def __init__(self, domain: Domain, initial: State) -> None:
+        self.plant = MujocoPlant.of(domain, initial)
         self.config = sampled_scene_config(initial)
 
     def detect(self) -> Sequence[DetectedPose]:

@@ -26,7 +26,7 @@ from slap_ros.evaluation.experiment import solve
 from slap_ros.evaluation.summary import Spread
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.learner_interface import learner_interface, without
-from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts import jobs, learning_attempt
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.settings import OURS, TrainingSettings, training_settings
@@ -298,14 +298,14 @@ def learn_without(
         Success and steps in training, and how each task was solved by each approach.
     """
     distribution = setup.tasks_of(seed, term)
-    attempt = jobs.LearningAttempt(
+    attempt = learning_attempt.LearningAttempt(
         distribution,
         Signature.from_json(problem["signature"]),
         tuple(StartRecord.from_json(start) for start in problem["starts"]),
         setup.settings(term),
         str(Path(folder) / f"{term} {seed}" / problem["name"]),
     )
-    shortcut = jobs.learn(attempt, processes=1)
+    shortcut = learning_attempt.learn(attempt, processes=1)
     domain = distribution.make_domain()
     library = ShortcutLibrary(setup.domain, (shortcut,), {})
     found: dict[str, Any] = {

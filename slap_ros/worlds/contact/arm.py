@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from slap_ros.geometry.pose import Pose, Vector, multiply, rotate
+from slap_ros.geometry.pose import Pose, Vector, dot, multiply, rotate
 from slap_ros.worlds.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
 
 Joints = tuple[float, ...]  # rad, seven
@@ -106,8 +106,8 @@ class _LastLink(NamedTuple):
         ahead, aside = cl * (zx * c1 + zy * s1) + sl * zz, zy * c1 - zx * s1
         sign = math.copysign(1.0, ahead)
         q5 = math.atan2(sign * aside, sign * ahead)
-        q6 = math.atan2(sign * math.hypot(ahead, aside), -_dot(forearm, self.z))
-        q7 = math.atan2(-sign * _dot(forearm, self.y), sign * _dot(forearm, self.x))
+        q6 = math.atan2(sign * math.hypot(ahead, aside), -dot(forearm, self.z))
+        q7 = math.atan2(-sign * dot(forearm, self.y), sign * dot(forearm, self.x))
         return (q1, q2, 0.0, q4, q5, q6 % (2.0 * math.pi), q7)
 
 
@@ -150,7 +150,3 @@ def _allowed(joints: Joints) -> Joints | None:
     if joints[5] > IN_LINE or not all(low <= q <= high for low, q, high in limits):
         return None
     return joints
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from slap_ros.geometry.oriented_box import UP, OrientedBox
-from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
+from slap_ros.geometry.pose import Pose, Vector, dot, multiply, normalised, rotate
 from slap_ros.relational import State
 from slap_ros.worlds.contact.links import link_poses, links
 from slap_ros.worlds.contact.scene import BoxPart, Compound, ContactScene, CylinderPart, Part
@@ -41,7 +41,7 @@ class Piece(NamedTuple):
     def extent(self, axis: Vector) -> float:
         """How far the piece reaches from its middle along a unit vector, m."""
         if isinstance(self.part, CylinderPart):
-            along = abs(_dot(axis, rotate(self.pose.quaternion, UP)))
+            along = abs(dot(axis, rotate(self.pose.quaternion, UP)))
             across = math.sqrt(max(0.0, 1.0 - along * along))
             return 0.5 * self.part.length_m * along + self.part.radius_m * across
         return OrientedBox(self.pose, self.part.half_extents_m).half_extent(axis)
@@ -98,7 +98,8 @@ def settled(scene: ContactScene, state: State) -> State:
     loose = [i for i in range(len(bodies)) if i != snapshot.held]
     for i in sorted(loose, key=lambda i: bodies[i].pose.position[2]):
         still = bodies[i].still
-        pose = _put(scene.free[i], bodies[i].pose, obstacles, still)
+        put = _laid_down if still else _moved_away
+        pose = put(scene.free[i], bodies[i].pose, obstacles)
         bodies[i] = bodies[i]._replace(pose=pose)
         obstacles += [SettlingObstacle(piece, still) for piece in _pieces(scene.free[i], pose)]
     return index.write(state, snapshot._replace(bodies=tuple(bodies)))
@@ -116,22 +117,28 @@ def _pieces(body: Compound, pose: Pose) -> list[Piece]:
     return [Piece.of(part, pose) for part in body.parts]
 
 
-def _put(
-    body: Compound, measured: Pose, obstacles: Sequence[SettlingObstacle], still: bool
-) -> Pose:
-    """The pose of a body outside of all others; one that lies still is flat and put down, too."""
-    pose = measured
-    if still:
-        pose = _flat(body, measured) or measured
+def _moved_away(body: Compound, measured: Pose, obstacles: Sequence[SettlingObstacle]) -> Pose:
+    """The pose of a body outside of all others."""
+    return _moved_out(body, measured, _beside(body, measured, obstacles))
+
+
+def _laid_down(body: Compound, measured: Pose, obstacles: Sequence[SettlingObstacle]) -> Pose:
+    """The pose of a body that lies flat, on what is below it, and outside of all others."""
+    flat = _flat(body, measured) or measured
+    beside = _beside(body, flat, obstacles)
+    pose = _moved_out(body, flat, beside)
+    x, y, z = pose.position
+    lowered = Pose((x, y, z - _height(body, pose, beside)), pose.quaternion)
+    return _moved_out(body, lowered, beside)
+
+
+def _beside(
+    body: Compound, pose: Pose, obstacles: Sequence[SettlingObstacle]
+) -> list[SettlingObstacle]:
+    """The obstacles that a body may touch on its way to where it lies."""
     around = body.at(pose)
     reach = around.radius + 2.0 * FLOATING
-    near = [one for one in obstacles if _near(one.piece, around.pose.position, reach)]
-    pose = _moved_out(body, pose, near)
-    if not still:
-        return pose
-    x, y, z = pose.position
-    pose = Pose((x, y, z - _height(body, pose, near)), pose.quaternion)
-    return _moved_out(body, pose, near)
+    return [one for one in obstacles if _near(one.piece, around.pose.position, reach)]
 
 
 def _near(piece: Piece, point: Vector, distance: float) -> bool:
@@ -207,7 +214,7 @@ def _overlap(first: Piece, second: Piece) -> Overlap:
     x, y, z = (p - q for p, q in zip(first.pose.position, second.pose.position, strict=True))
     upward = first.extent(UP) + second.extent(UP) - abs(z)
     found = [
-        (first.extent(axis) + second.extent(axis) - abs(_dot(axis, (x, y, z))), axis)
+        (first.extent(axis) + second.extent(axis) - abs(dot(axis, (x, y, z))), axis)
         for axis in _ways(first, second, (x, y, z))
     ]
     depth, (a, b, _) = min(found)
@@ -221,7 +228,3 @@ def _ways(first: Piece, second: Piece, offset: Vector) -> Iterable[Vector]:
     length = math.hypot(x, y)
     between = ((x / length, y / length, 0.0),) if length > APART else ((1.0, 0.0, 0.0),)
     return (*first.sideways(), *second.sideways(), *between)
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

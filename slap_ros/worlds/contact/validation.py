@@ -8,18 +8,16 @@ import math
 from collections.abc import Sequence
 
 from slap_ros.errors import InvalidStateError
-from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.worlds.contact.arm import arm_joints
 from slap_ros.worlds.contact.hand import LEASH, PAD, YAW_LEASH, HandState, rotation_between, wrapped
 from slap_ros.worlds.contact.scene import ContactScene, JointKind
 from slap_ros.worlds.contact.snapshot import ContactSnapshot, Placement
-from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW, grasp_pose
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, grasp_pose
+from slap_ros.worlds.validation import require_joints_within_limits, require_rotations, share_space
 
 # Pressed together, bodies overlap by a few millimetres; what overlaps by more was put there.
 OVERLAP = 0.01  # m
-UNIT_TOLERANCE = 1e-6  # 1, of a quaternion's length
-LIMIT_TOLERANCE = 1e-9  # rad
 ARM_TOLERANCE = 1e-6  # m and rad, between the hand and where the arm's joints have it
 TARGET_TOLERANCE = 2.0  # times the leash
 TILTED = 0.5  # rad, from pointing straight down
@@ -43,7 +41,7 @@ def require_possible(
     Raises:
         InvalidStateError: Names the value that is wrong, and what would be right.
     """
-    _require_rotations(scene, snapshot, placement)
+    require_rotations(_poses(scene, snapshot, placement))
     _require_near_and_slow(scene, snapshot, placement)
     _require_hand(snapshot.hand, gripper)
     _require_arm(snapshot)
@@ -55,15 +53,6 @@ def require_possible(
             )
     _require_apart(scene, snapshot, placement)
     _require_held(scene, snapshot)
-
-
-def _require_rotations(
-    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
-) -> None:
-    for name, pose in _poses(scene, snapshot, placement):
-        length = math.hypot(*pose.quaternion)
-        if abs(length - 1.0) > UNIT_TOLERANCE:
-            raise InvalidStateError(f"the quaternion of {name} has length {length}, not 1")
 
 
 def _require_near_and_slow(
@@ -114,9 +103,7 @@ def _require_hand(hand: HandState, gripper: float) -> None:
 
 
 def _require_arm(snapshot: ContactSnapshot) -> None:
-    for i, (low, q, high) in enumerate(zip(JOINT_LOW, snapshot.joints, JOINT_HIGH, strict=True)):
-        if not low - LIMIT_TOLERANCE <= q <= high + LIMIT_TOLERANCE:
-            raise InvalidStateError(f"joint {i + 1} = {q} rad is not within [{low}, {high}]")
+    require_joints_within_limits(snapshot.joints)
     hand = snapshot.hand
     if arm_joints(hand.pose) is None:
         raise InvalidStateError(f"the arm cannot have its hand at {hand.pose.position} m")
@@ -150,7 +137,7 @@ def _require_apart(scene: ContactScene, snapshot: ContactSnapshot, placement: Pl
     for name, boxes in movable:
         cores = [box.shrunk(OVERLAP / 2) for box in boxes]
         for other, others in placed:
-            if _share_space(cores, others):
+            if share_space(cores, others):
                 raise InvalidStateError(f"{name} and {other} are inside one another")
         placed.append((name, cores))
 
@@ -162,7 +149,7 @@ def _require_held(scene: ContactScene, snapshot: ContactSnapshot) -> None:
     body, motion = scene.free[snapshot.held], snapshot.bodies[snapshot.held]
     parts = [part.bounding_box.at(motion.pose) for part in body.parts]
     for pad in (box for box in snapshot.hand.boxes() if box.half == PAD.half_extents_m):
-        if not _share_space([pad.grown(GRASP_GAP)], parts):
+        if not share_space([pad.grown(GRASP_GAP)], parts):
             raise InvalidStateError(f"{body.name} is held, but not between the fingers")
 
 
@@ -173,11 +160,3 @@ def _poses(
     fixed = [(b.name, pose) for b, pose in zip(scene.fixed, placement.fixed, strict=True)]
     jointed = [(b.name, pose) for b, pose in zip(scene.jointed, placement.jointed, strict=True)]
     return [("the hand", snapshot.hand.pose), *free, *fixed, *jointed]
-
-
-def _share_space(some: Sequence[OrientedBox], others: Sequence[OrientedBox]) -> bool:
-    return any(
-        other.near(box.pose.position, box.radius) and other.overlaps(box)
-        for box in some
-        for other in others
-    )

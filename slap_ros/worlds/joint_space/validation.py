@@ -8,20 +8,18 @@ import math
 from collections.abc import Sequence
 
 from slap_ros.errors import InvalidStateError
-from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.worlds.bodies import Material
 from slap_ros.worlds.joint_space.arm import Obstacle, Posture, Surroundings
 from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.snapshot import Snapshot
-from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
+from slap_ros.worlds.validation import require_joints_within_limits, require_rotations, share_space
 
 # Pressed together, bodies overlap for a while by as much as a few centimetres; what overlaps
 # by more than this was put there.
 OVERLAP = 0.025  # m
-UNIT_TOLERANCE = 1e-6  # 1, of a quaternion's length
 HELD_TOLERANCE = 1e-3  # m and rad, between a held body and where the hand has it
-LIMIT_TOLERANCE = 1e-9  # rad
 
 
 def require_valid(
@@ -46,10 +44,8 @@ def require_valid(
             bodies inside one another, or a held body that is not in the hand.
     """
     _require_materials(scene, materials)
-    _require_rotations(scene, snapshot)
-    for i, (low, q, high) in enumerate(zip(JOINT_LOW, snapshot.joints, JOINT_HIGH, strict=True)):
-        if not low - LIMIT_TOLERANCE <= q <= high + LIMIT_TOLERANCE:
-            raise InvalidStateError(f"joint {i + 1} = {q} rad is not within [{low}, {high}]")
+    require_rotations(_poses(scene, snapshot))
+    require_joints_within_limits(snapshot.joints)
     if not FINGER_CLOSED <= snapshot.finger <= FINGER_OPEN:
         raise InvalidStateError(f"finger = {snapshot.finger} m is not within [0, {FINGER_OPEN}]")
     if snapshot.held is not None:
@@ -69,12 +65,9 @@ def _require_materials(scene: Scene, materials: Sequence[Material]) -> None:
             )
 
 
-def _require_rotations(scene: Scene, snapshot: Snapshot) -> None:
-    quaternions = [(body.name, m.pose) for body, m in zip(scene.free, snapshot.bodies, strict=True)]
-    for name, pose in [*quaternions, ("the grasp", snapshot.grasp)]:
-        length = math.hypot(*pose.quaternion)
-        if abs(length - 1.0) > UNIT_TOLERANCE:
-            raise InvalidStateError(f"the quaternion of {name} has length {length}, not 1")
+def _poses(scene: Scene, snapshot: Snapshot) -> list[tuple[str, Pose]]:
+    free = [(body.name, m.pose) for body, m in zip(scene.free, snapshot.bodies, strict=True)]
+    return [*free, ("the grasp", snapshot.grasp)]
 
 
 def _require_in_hand(scene: Scene, snapshot: Snapshot, arm: Posture) -> None:
@@ -97,15 +90,7 @@ def _require_apart(scene: Scene, snapshot: Snapshot, obstacles: Sequence[Obstacl
     fixed = [box.shrunk(OVERLAP / 2) for box, _ in obstacles]
     for i, (name, cores) in enumerate(placed):
         for other, others in placed[:i]:
-            if _share_space(cores, others):
+            if share_space(cores, others):
                 raise InvalidStateError(f"{name} and {other} are inside one another")
-        if _share_space(cores, fixed):
+        if share_space(cores, fixed):
             raise InvalidStateError(f"{name} is inside a fixed body")
-
-
-def _share_space(some: Sequence[OrientedBox], others: Sequence[OrientedBox]) -> bool:
-    return any(
-        other.near(box.pose.position, box.radius) and other.overlaps(box)
-        for box in some
-        for other in others
-    )
