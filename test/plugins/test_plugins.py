@@ -238,13 +238,13 @@ def undrawn():
 
 def test_a_mistake_in_a_domains_own_code_is_no_fault_of_ours(install):
     install({"stranger": "stranger:make", "undrawn": "stranger:undrawn"}, stranger=FAILING)
-    failed = CliRunner().invoke(app, ["plan", "stranger"])
+    failed = slap("plan", "stranger")
     assert failed.exit_code == ErrorCode.INVALID_DOMAIN
     assert "KeyError in stranger.py, line 11, of the package stranger" in failed.stderr
     assert "token" not in failed.stderr
     log = Path(failed.stderr.split()[-1])
     assert "KeyError: 'token=of-a-lab'" in log.read_text(encoding="utf-8")
     log.unlink()
-    failed = CliRunner().invoke(app, ["plan", "undrawn"])
+    failed = slap("plan", "undrawn")
     assert failed.exit_code == ErrorCode.INVALID_DOMAIN
     assert "sample_task gives NoneType, expected a Task" in failed.stderr
