@@ -85,7 +85,13 @@ class Model:
 
     @classmethod
     def of(cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = _never) -> Self:
-        """A model for the tasks over these objects; for the last argument see the class."""
+        """A model for the tasks over some objects.
+
+        Args:
+            domain: Domain of the tasks.
+            initial: A state with these objects.
+            is_canceled: See the class.
+        """
         space = domain.atom_space(initial)
         return cls(domain.model_world(initial), space, domain.action_space, is_canceled)
 
