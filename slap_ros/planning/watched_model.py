@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from slap_ros.core import ActionSpace, World
 from slap_ros.planning.model import Model, Rollout
 from slap_ros.planning.options import Option, OptionKind
@@ -16,15 +18,22 @@ class WatchedModel(Model):
     What follows such an option counts as after the shortcut, too.
     """
 
-    def __init__(self, world: World, space: AtomSpace, actions: ActionSpace) -> None:
+    def __init__(
+        self,
+        world: World,
+        space: AtomSpace,
+        actions: ActionSpace,
+        is_canceled: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Begin with nothing noted.
 
         Args:
             world: World in which options are rolled out; nobody else may use it.
             space: Atoms of the task.
             actions: Actions of the robot.
+            is_canceled: Whether nobody wants a plan any more.
         """
-        super().__init__(world, space, actions)
+        super().__init__(world, space, actions, is_canceled)
         self._after: set[bytes] = set()  # keys of the states that shortcuts led to
         self._tried: dict[tuple[Option, bytes], tuple[Option, State]] = {}
 
