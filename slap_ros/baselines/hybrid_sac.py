@@ -25,7 +25,7 @@ from torch.nn import functional
 
 from slap_ros.environments.controls import ChoiceSpace
 
-SHARPNESS = 5.0  # from scores between -1 and 1 to logarithms of probabilities
+SHARPNESS = 1.0  # from scores between -1 and 1 to logarithms of probabilities
 CHOICE_ENTROPY = 0.7  # of choices that SAC aims at, as a share of that of random ones
 SMALLEST = 1e-6  # derivative of tanh
 
