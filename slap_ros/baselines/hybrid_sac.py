@@ -25,8 +25,8 @@ from torch.nn import functional
 
 from slap_ros.environments.controls import ChoiceSpace
 
-SHARPNESS = 1.0  # from scores between -1 and 1 to logarithms of probabilities
-CHOICE_ENTROPY = 0.7  # of choices that SAC aims at, as a share of that of random ones
+SHARPNESS = 5.0  # from scores between -1 and 1 to logarithms of probabilities
+CHOICE_ENTROPY = 0.5  # of choices that SAC aims at, as a share of that of random ones
 SMALLEST = 1e-6  # derivative of tanh
 
 
@@ -165,7 +165,7 @@ class HybridSac(SAC):
             assert isinstance(actor, HybridActor)
             proposed = actor.propose(samples.observations)
             weights = self._weigh_entropies(proposed, actor.takes)
-            self._learn_values(samples, actor)
+            self._learn_values(samples, actor, weights)
             values = self._values(self.critic, samples.observations, proposed, actor)
             _descend(actor.optimizer, _actor_loss(proposed, values, weights))
             polyak_update(self.critic.parameters(), self.critic_target.parameters(), self.tau)
@@ -185,16 +185,14 @@ class HybridSac(SAC):
         _descend(self.ent_coef_optimizer, -(self.log_ent_coef * missing).sum())
         return weights
 
-    def _learn_values(self, samples: DictReplayBufferSamples, actor: HybridActor) -> None:
-        """Update the critics towards what follows the actions that were taken.
-
-        Values have no entropy: it is paid for each action, until the goal is reached, so that it
-        would be better not to reach it, and to act in short steps.
-        """
+    def _learn_values(
+        self, samples: DictReplayBufferSamples, actor: HybridActor, weights: torch.Tensor
+    ) -> None:
+        """Update the critics towards what follows the actions that were taken."""
         with torch.no_grad():
             after = actor.propose(samples.next_observations)
             values = self._values(self.critic_target, samples.next_observations, after, actor)
-            value = after.mean(values)
+            value = after.mean(values) - (after.log_probs @ weights)[:, None]
             target = samples.rewards + (1.0 - samples.dones) * self.gamma * value
         count = len(actor.takes)
         chosen = functional.one_hot(samples.actions[:, :count].argmax(dim=1), count).float()

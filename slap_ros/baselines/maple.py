@@ -67,10 +67,10 @@ class AffordanceRewards(VecEnvWrapper):
 class MapleSettings(StagedSacSettings):
     """Hyper-parameters: those of ``sac``, but for how much is learned from how many actions."""
 
-    learning_starts: int = 200  # random actions, most of which take tens of environment steps
+    learning_starts: int = 100  # random actions, most of which take tens of environment steps
     gamma: float = 0.95  # of an action
     gradient_steps: int = 32
-    affordance: float = 2.0  # what a point costs that is far away
+    affordance: float = 5.0  # what a point costs that is far away
 
 
 class MapleLearner(SacTaskLearner):

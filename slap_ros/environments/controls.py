@@ -24,7 +24,7 @@ from slap_ros.relational import AtomSpace, State, Target
 from slap_ros.relational.state import Array
 
 ACTIVE = 0.5  # activation from which on a skill is run
-NEAR = 0.02  # m, within which a primitive is about what a plan is about
+NEAR = 0.05  # m, within which a primitive is about what a plan is about
 FAR = 0.1  # m, over which its affordance falls from there on
 
 
