@@ -16,10 +16,11 @@ import numpy as np
 import torch
 from gymnasium import spaces
 from stable_baselines3 import SAC
+from stable_baselines3.common.policies import ContinuousCritic
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, create_mlp
 from stable_baselines3.common.type_aliases import DictReplayBufferSamples, PyTorchObs
 from stable_baselines3.common.utils import polyak_update
-from stable_baselines3.sac.policies import Actor, ContinuousCritic, MultiInputPolicy
+from stable_baselines3.sac.policies import Actor, MultiInputPolicy
 from torch import nn
 from torch.nn import functional
 
@@ -91,7 +92,8 @@ class HybridActor(Actor):
         normal = torch.distributions.Normal(mean[:, count:], log_std[:, count:].exp())
         raw = normal.rsample()
         numbers = torch.tanh(raw)
-        density = normal.log_prob(raw) - torch.log(1.0 - numbers.square() + SMALLEST)
+        density = normal.log_prob(raw)  # type: ignore[no-untyped-call]
+        density = density - torch.log(1.0 - numbers.square() + SMALLEST)
         return Proposal(log_choice, numbers, density @ self.takes.T)
 
     def forward(self, obs: PyTorchObs, deterministic: bool = False) -> torch.Tensor:
@@ -216,9 +218,7 @@ class HybridSac(SAC):
         return torch.cat(critic(repeated, each), dim=1).min(dim=1).values.reshape(n, count)
 
 
-def _actor_loss(
-    proposed: Proposal, values: torch.Tensor, weights: torch.Tensor
-) -> torch.Tensor:
+def _actor_loss(proposed: Proposal, values: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
     """What both levels of the policy are to make small.
 
     The numbers of each choice are learned however seldom it is chosen: weighed by its probability,

@@ -139,7 +139,8 @@ class ChoiceSpace(spaces.Box):
     def takes(self) -> NDArray[np.bool_]:
         """Which of the numbers after the scores each choice takes, shape (choices, numbers)."""
         choices = np.arange(len(self.sizes))
-        return np.repeat(choices, self.sizes) == choices[:, None]
+        takes: NDArray[np.bool_] = np.repeat(choices, self.sizes) == choices[:, None]
+        return takes
 
     def chosen(self, action: Action) -> int:
         """The choice with the highest score in an action of the space."""
