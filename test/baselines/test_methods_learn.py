@@ -73,11 +73,3 @@ def test_a_controller_of_options_takes_a_block(tmp_path):
 def test_sac_takes_a_block_from_near_the_end_of_demonstrations_first(tmp_path):
     changes = {**QUICK_SAC, "learning_starts": 400}
     assert success("curriculum", EASY, HOLDING, 2_000, changes, tmp_path) >= 0.5
-
-
-@pytest.mark.slow  # SAC over movements: 2,000 updates of actor and critics
-@pytest.mark.training
-@pytest.mark.timeout(300)
-def test_movements_and_where_they_act_are_learned_to_take_a_cube(tmp_path):
-    """Random ones take it in few of 20 tasks, within ten movements."""
-    raise NotImplementedError
