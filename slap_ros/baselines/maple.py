@@ -10,6 +10,7 @@ there is MAPLE's affordance, by which a point costs the more the farther it is f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,12 +21,16 @@ from stable_baselines3.common.buffers import DictReplayBuffer
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from slap_ros.baselines import sac
-from slap_ros.baselines.hybrid_sac import HybridSac
+from slap_ros.baselines.hybrid_sac import SHARPNESS, HybridSac
 from slap_ros.baselines.method import Method
 from slap_ros.baselines.sac import SacTaskLearner, StagedSacSettings
 from slap_ros.baselines.training_envs import TrainingEnvs, separate_envs
 from slap_ros.environments.controls import PrimitiveControl
+from slap_ros.policies.mlp_policy import MlpPolicy
 
+# Standard deviations: of Gumbel noise, which chooses by probability; at the entropy of SAC, -1 each.
+SCORE_NOISE = math.pi / math.sqrt(6.0) / SHARPNESS
+NUMBER_NOISE = math.exp(-1.0) / math.sqrt(2.0 * math.pi * math.e)
 NEWEST = 1_000  # actions of each environment, of which a share is taken
 
 
@@ -100,6 +105,16 @@ class MapleLearner(SacTaskLearner):
         )
         self._choices = len(control.space.sizes)
 
+    def policy(self) -> MlpPolicy:
+        """The most likely actions, and noise by which others are chosen about as often as learned.
+
+        Without noise, a movement that changes nothing is chosen for ever.
+        """
+        likely = super().policy()
+        noise = np.full(len(likely.log_std), math.log(NUMBER_NOISE), np.float32)
+        noise[: self._choices] = math.log(SCORE_NOISE)
+        return replace(likely, log_std=noise)
+
     def figures(self) -> Mapping[str, float]:
         """How often joints are moved, as a share of the newest actions of all environments."""
         taken = self.buffer.actions[max(0, self.buffer.pos - NEWEST) : self.buffer.pos]
@@ -114,5 +129,4 @@ METHOD = Method(
     {"ours": MapleSettings()},
     MapleLearner,
     separate_envs,
-    noisy=False,
 )
