@@ -28,7 +28,8 @@ from slap_ros.baselines.training_envs import TrainingEnvs, separate_envs
 from slap_ros.environments.controls import PrimitiveControl
 from slap_ros.policies.mlp_policy import MlpPolicy
 
-# Standard deviations: of Gumbel noise, which chooses by probability; at the entropy of SAC, -1 each.
+# Standard deviations: of the Gumbel noise by which choices have their probabilities, and of numbers
+# with the entropy that SAC aims at, -1 each.
 SCORE_NOISE = math.pi / math.sqrt(6.0) / SHARPNESS
 NUMBER_NOISE = math.exp(-1.0) / math.sqrt(2.0 * math.pi * math.e)
 NEWEST = 1_000  # actions of each environment, of which a share is taken

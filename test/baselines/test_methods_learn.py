@@ -75,7 +75,7 @@ def test_sac_takes_a_block_from_near_the_end_of_demonstrations_first(tmp_path):
     assert success("curriculum", EASY, HOLDING, 2_000, changes, tmp_path) >= 0.5
 
 
-@pytest.mark.slow  # 10,000 environment steps of movements, and 4,900 updates of actor and critics
+@pytest.mark.slow  # 10,000 environment steps of movements, and thousands of updates
 @pytest.mark.training
 @pytest.mark.timeout(600)
 def test_a_cube_is_taken_by_movements_that_are_aimed_at_it(tmp_path, monkeypatch):
