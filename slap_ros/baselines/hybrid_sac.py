@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from gymnasium import spaces
 from stable_baselines3 import SAC
 from stable_baselines3.common.policies import ContinuousCritic
-from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, create_mlp
+from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.type_aliases import DictReplayBufferSamples, PyTorchObs
 from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.sac.policies import Actor, MultiInputPolicy
@@ -31,7 +30,7 @@ CHOICE_ENTROPY = 0.5  # of choices that SAC aims at, as a share of that of rando
 SMALLEST = 1e-6  # derivative of tanh
 
 
-class Proposal(NamedTuple):
+class ProposedActions(NamedTuple):
     """What a policy would do in each of n states.
 
     Args:
@@ -84,7 +83,7 @@ class HybridActor(Actor):
         self.takes = torch.as_tensor(self.action_space.takes, dtype=torch.float32)
         self.slots = slots_of(self.action_space)
 
-    def propose(self, observations: PyTorchObs) -> Proposal:
+    def propose(self, observations: PyTorchObs) -> ProposedActions:
         """Probabilities of choices, and numbers for each, with the noise of exploring."""
         mean, log_std, _ = self.get_action_dist_params(observations)
         count = len(self.takes)
@@ -94,7 +93,7 @@ class HybridActor(Actor):
         numbers = torch.tanh(raw)
         density = normal.log_prob(raw)  # type: ignore[no-untyped-call]
         density = density - torch.log(1.0 - numbers.square() + SMALLEST)
-        return Proposal(log_choice, numbers, density @ self.takes.T)
+        return ProposedActions(log_choice, numbers, density @ self.takes.T)
 
     def forward(self, obs: PyTorchObs, deterministic: bool = False) -> torch.Tensor:
         """An action: 1 for the choice, -1 for the others, and the numbers of all."""
@@ -109,20 +108,15 @@ class HybridActor(Actor):
 class NormalisedCritic(ContinuousCritic):
     """SAC's critics with normalised hidden layers, as acquired skills have them."""
 
-    def __init__(
-        self,
-        observation_space: spaces.Space[Any],
-        action_space: spaces.Box,
-        net_arch: list[int],
-        features_extractor: BaseFeaturesExtractor,
-        features_dim: int,
-        **options: Any,
-    ) -> None:
-        """See stable-baselines3."""
-        super().__init__(
-            observation_space, action_space, net_arch, features_extractor, features_dim, **options
-        )
-        size = features_dim + int(action_space.shape[0])
+    def __init__(self, **options: Any) -> None:
+        """Make the critics.
+
+        Args:
+            options: Arguments of stable-baselines3's critics.
+        """
+        super().__init__(**options)
+        assert isinstance(self.action_space, ChoiceSpace)
+        size, net_arch = options["features_dim"] + self.action_space.shape[0], options["net_arch"]
         for number in range(self.n_critics):
             layers = create_mlp(size, 1, net_arch, post_linear_modules=[nn.LayerNorm])
             self.q_networks[number] = nn.Sequential(*layers)
@@ -173,7 +167,7 @@ class HybridSac(SAC):
             polyak_update(self.critic.parameters(), self.critic_target.parameters(), self.tau)
         self._n_updates += gradient_steps
 
-    def _weigh_entropies(self, proposed: Proposal, takes: torch.Tensor) -> torch.Tensor:
+    def _weigh_entropies(self, proposed: ProposedActions, takes: torch.Tensor) -> torch.Tensor:
         """The weights of both entropies, shape (2,), which are then updated.
 
         Numbers have the entropy that SAC has: -1 for each that is taken.
@@ -205,7 +199,10 @@ class HybridSac(SAC):
 
     @staticmethod
     def _values(
-        critic: ContinuousCritic, observations: PyTorchObs, proposed: Proposal, actor: HybridActor
+        critic: ContinuousCritic,
+        observations: PyTorchObs,
+        proposed: ProposedActions,
+        actor: HybridActor,
     ) -> torch.Tensor:
         """The lesser of the critics' values of each choice with its numbers, (n, choices)."""
         n, count = proposed.log_choice.shape
@@ -218,7 +215,9 @@ class HybridSac(SAC):
         return torch.cat(critic(repeated, each), dim=1).min(dim=1).values.reshape(n, count)
 
 
-def _actor_loss(proposed: Proposal, values: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
+def _actor_loss(
+    proposed: ProposedActions, values: torch.Tensor, weights: torch.Tensor
+) -> torch.Tensor:
     """What both levels of the policy are to make small.
 
     The numbers of each choice are learned however seldom it is chosen: weighed by its probability,
