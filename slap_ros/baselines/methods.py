@@ -36,6 +36,9 @@ METHODS: Mapping[str, MethodEntry] = {
     "curriculum": MethodEntry(
         "curriculum", "The same SAC from near the end of demonstrations, moved back with success."
     ),
+    "maple": MethodEntry(
+        "maple", "SAC that chooses movements of the hand and where they act, as MAPLE does."
+    ),
     "sac-her": MethodEntry("sac_her", "SAC with hindsight experience replay of the whole task."),
     "hierarchical": MethodEntry(
         "hierarchical", "PPO over joint displacements and an activation for each ground skill."

@@ -29,11 +29,13 @@ Primitive = Callable[[State, Array], Policy]
 class Primitives:
     """Movements with parameters, which some learners of whole tasks choose from instead of skills.
 
-    All have the same parameters, the first three of which are a position in the base's frame, m. A
-    learner says where it is relative to what the plan's present operator acts on.
+    Each takes as many parameters as it has of the same ones, the first three of which are a
+    position in the base's frame, m. A learner says where it is relative to what the plan's present
+    operator acts on.
 
     Args:
         policies: Movements by name.
+        sizes: How many of the parameters each movement takes, by name: none, or three at least.
         low: Least value of each parameter, shape (parameters,).
         high: Largest value of each parameter, shape (parameters,).
         target_of: Function from a state and an operator's objects to the position of the one that
@@ -41,6 +43,7 @@ class Primitives:
     """
 
     policies: Mapping[str, Primitive]
+    sizes: Mapping[str, int]
     low: Array
     high: Array
     target_of: Callable[[State, tuple[Object, ...]], Vector]

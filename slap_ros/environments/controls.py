@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,6 +24,8 @@ from slap_ros.relational import AtomSpace, State, Target
 from slap_ros.relational.state import Array
 
 ACTIVE = 0.5  # activation from which on a skill is run
+NEAR = 0.05  # m, within which a primitive is about what a plan is about
+FAR = 0.1  # m, over which its affordance falls from there on
 
 
 class Control(Protocol):
@@ -120,11 +123,40 @@ class MixedControl:
         return self.skills.mask(episode)
 
 
+class ChoiceSpace(spaces.Box):
+    """A score for each choice, then the numbers that each takes, all from -1 to 1."""
+
+    def __init__(self, sizes: Sequence[int]) -> None:
+        """Make room for the choices.
+
+        Args:
+            sizes: How many numbers each choice takes.
+        """
+        self.sizes = tuple(sizes)
+        super().__init__(-1.0, 1.0, (len(self.sizes) + sum(self.sizes),), np.float32)
+
+    @property
+    def takes(self) -> NDArray[np.bool_]:
+        """Which of the numbers after the scores each choice takes, shape (choices, numbers)."""
+        choices = np.arange(len(self.sizes))
+        takes: NDArray[np.bool_] = np.repeat(choices, self.sizes) == choices[:, None]
+        return takes
+
+    def chosen(self, action: Action) -> int:
+        """The choice with the highest score in an action of the space."""
+        return int(action[: len(self.sizes)].argmax())
+
+    def numbers(self, action: Action, choice: int) -> Action:
+        """The numbers of an action of the space that a choice takes."""
+        taken: Action = action[len(self.sizes) :][self.takes[choice]]
+        return taken
+
+
 class PrimitiveControl:
     """A score for one step of the joints and for each primitive: what has the highest is done.
 
-    An action has the scores, then the primitives' parameters, then the joints' axes. Positions are
-    relative to what the present operator of the task's plan acts on.
+    An action has the scores, then the joints' axes, then the parameters of each primitive.
+    Positions are relative to what the present operator of the task's plan acts on.
     """
 
     def __init__(self, domain: Domain) -> None:
@@ -144,28 +176,48 @@ class PrimitiveControl:
         self.primitives = domain.acquisition.primitives
         self.joints = JointControl(domain)
         (axes,) = self.joints.space.shape
-        self._scores = 1 + len(self.primitives.policies)
-        size = self._scores + len(self.primitives.low) + int(axes)
-        self.space = spaces.Box(-1.0, 1.0, (size,), np.float32)
+        sizes = [self.primitives.sizes[name] for name in self.primitives.policies]
+        self.space = ChoiceSpace([int(axes), *sizes])
 
     def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
         """See :class:`Control`."""
         given = np.clip(checked(action, self.space), -1.0, 1.0)
-        scores, rest = np.split(given, [self._scores])
-        told, axes = np.split(rest, [len(self.primitives.low)])
-        chosen = int(scores.argmax())
+        chosen = self.space.chosen(given)
         if chosen == 0 or not episode.stage:  # without a plan there is nothing to aim at
-            yield from self.joints.act(axes, episode, world)
+            yield from self.joints.act(self.space.numbers(given, 0), episode, world)
             return
         primitive = list(self.primitives.policies.values())[chosen - 1]
-        yield from self._run(primitive, self._parameters(told, episode), episode, world)
+        parameters = self._parameters(self.space.numbers(given, chosen), episode)
+        yield from self._run(primitive, parameters, episode, world)
+
+    def affordance(self, action: Action) -> float:
+        """How near an action's point is to what the plan's present operator acts on, 0 to 1.
+
+        MAPLE's affordance score (Nasiriany et al. 2022, §III), with what the plan is about for its
+        keypoints. It is 1 within :data:`NEAR`, and for what has no point.
+
+        Args:
+            action: Action, one of the space.
+        """
+        chosen = self.space.chosen(action)
+        told = self.space.numbers(action, chosen)
+        if chosen == 0 or not len(told):
+            return 1.0
+        distance = float(np.linalg.norm(self._values(told)[:3]))
+        return 1.0 - math.tanh(max(distance - NEAR, 0.0) / FAR)
 
     def _parameters(self, told: Action, episode: TaskEpisode) -> Array:
         """The parameters of a primitive, from numbers between -1 and 1."""
-        low, high = self.primitives.low, self.primitives.high
-        parameters = low + 0.5 * (told + 1.0) * (high - low)
+        parameters = self._values(told)
         parameters[:3] += self.primitives.target_of(episode.state, episode.stage)
         return on_grid(parameters)
+
+    def _values(self, told: Action) -> Array:
+        """The parameters relative to the target; those that a primitive does not take are 0."""
+        low, high = self.primitives.low, self.primitives.high
+        values, size = np.zeros(len(low)), len(told)
+        values[:size] = low[:size] + 0.5 * (told + 1.0) * (high[:size] - low[:size])
+        return values
 
     def _run(
         self, primitive: Primitive, parameters: Array, episode: TaskEpisode, world: World

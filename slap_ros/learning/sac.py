@@ -39,6 +39,7 @@ def make_sac(
     *,
     policy: str = "MlpPolicy",
     replay: type[ReplayBuffer],
+    kind: type[SAC] = SAC,
     **options: Any,
 ) -> SAC:
     """SAC with random weights and no transitions.
@@ -49,12 +50,13 @@ def make_sac(
         seed: Seed of weights and noise.
         policy: Kind of policy, as stable-baselines3 has it.
         replay: Kind of replay buffer.
+        kind: SAC itself, or a kind of it.
         options: Further arguments of stable-baselines3's SAC, such as the buffer's size.
 
     Returns:
         The algorithm, before its first step.
     """
-    return SAC(
+    return kind(
         policy,
         envs,
         replay_buffer_class=replay,

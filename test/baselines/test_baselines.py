@@ -22,7 +22,7 @@ from slap_ros.baselines.training_envs import joined_envs, separate_envs
 from slap_ros.baselines.trials import try_baseline
 from slap_ros.domains import get_domain
 from slap_ros.environments.registration import make_task_env
-from slap_ros.errors import ErrorCode, InvalidLibraryError, InvalidParameterError
+from slap_ros.errors import ErrorCode, InvalidLibraryError, InvalidParameterError, NoSkillsError
 from support.marks import slow
 
 SHORT = {"n_envs": 2, "n_steps": 32, "batch_size": 32, "n_epochs": 1, "validation": 1}
@@ -165,6 +165,39 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     (tmp_path / "x-training" / "settings.json").unlink()
     with pytest.raises(InvalidParameterError, match=r"no settings\.json that says of which"):
         train_baseline(method, domain, tmp_path / "x", **given, seed=1)
+
+
+@pytest.mark.timeout(180)  # trains twice, with an interruption each time
+def test_primitives_are_learned_to_the_same_bytes_after_an_interruption(tmp_path, monkeypatch):
+    monkeypatch.setattr("slap_ros.baselines.progress_curve.TIMES", 1)
+    changes = {"n_envs": 2, "learning_starts": 2, "gradient_steps": 1, "batch_size": 8}
+    changes |= {"net_arch": (16,), "validation": 1}
+    domain, stored = get_domain("stack_at_target"), []
+
+    def stop(progress):
+        if progress.steps >= 300 and not (folder / "stopped").exists():
+            (folder / "stopped").touch()
+            raise KeyboardInterrupt
+
+    given = {"goal": "(Holding cube0)", "steps": 600, "changes": changes, "report": stop}
+    for folder in (tmp_path / "one", tmp_path / "other"):
+        folder.mkdir()
+        with pytest.raises(KeyboardInterrupt):
+            train_baseline("maple", domain, folder / "x", **given)
+        kept = np.load(folder / "x-training" / REPLAY)["actions"]
+        train_baseline("maple", domain, folder / "x", **given)
+        after = np.load(folder / "x-training" / REPLAY)["actions"]
+        assert 2 <= len(kept) < len(after)
+        assert np.array_equal(after[: len(kept)], kept)
+        stored.append((folder / "x" / "policy.safetensors").read_bytes())
+    assert stored[0] == stored[1]
+    found = load_baseline(folder / "x", domain)
+    assert (found.actions, found.environment["control"]) == (30, "primitives")
+    (folder / "x-training" / REPLAY).write_bytes(b"PK damaged")
+    with pytest.raises(InvalidParameterError, match=r"replay\.npz: damaged"):
+        train_baseline("maple", domain, folder / "x", **given)
+    with pytest.raises(NoSkillsError, match="obstacle2d has no primitives"):
+        train_baseline("maple", get_domain("obstacle2d"), tmp_path / "none")
 
 
 @pytest.mark.slow
@@ -311,7 +344,7 @@ def test_more_objects_than_a_policy_has_room_for_count_as_failed(trained, domain
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("dreamer", "obstacle2d"), 2, "there are ppo, sac, curriculum, sac-her"),
+        (("dreamer", "obstacle2d"), 2, "there are ppo, sac, curriculum, maple"),
         (("ppo", "moon"), ErrorCode.UNKNOWN_DOMAIN, "moon"),
         (("ppo", "obstacle2d", "--settings", "best"), 15, "there are ours, paper"),
         (("ppo", "obstacle2d", "--set", "tau=1"), 15, "unknown setting 'tau'; there are n_envs"),
@@ -328,4 +361,6 @@ def test_what_there_is_not_is_refused(tmp_path, arguments, code, words):
 def test_methods_are_listed():
     code, said, _ = slap("baseline", "list", "--json")
     assert code == 0
-    assert list(json.loads(said)) == ["ppo", "sac", "curriculum", "sac-her", "hierarchical", "sol"]
+    assert list(json.loads(said)) == [
+        *("ppo", "sac", "curriculum", "maple", "sac-her", "hierarchical", "sol")
+    ]

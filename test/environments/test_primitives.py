@@ -8,9 +8,11 @@ import re
 import numpy as np
 import pytest
 
+from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.hand_motion import nearest_turn
 from slap_ros.domains.benchtop.primitives import PRIMITIVES
 from slap_ros.domains.benchtop.state_access import position_of, standing_on, yaw_of
+from slap_ros.environments.controls import PrimitiveControl
 from slap_ros.environments.registration import make_task_env
 from slap_ros.errors import InvalidCommandError, InvalidParameterError, NoSkillsError
 
@@ -31,7 +33,11 @@ def action(name, offset=(0.0, 0.0, 0.0), yaw=0.0, push=(0.0, 0.0, 0.0), joints=(
     scores = np.full(len(NAMES), -1.0)
     scores[NAMES.index(name)] = 1.0
     told = 2.0 * (np.array([*offset, yaw, *push]) - LOW) / (HIGH - LOW) - 1.0
-    return np.array([*scores, *told, *joints], dtype=np.float32)
+    own = [
+        told[: PRIMITIVES.sizes[one]] if one == name else np.ones(PRIMITIVES.sizes[one])
+        for one in NAMES[1:]
+    ]  # what others take does not matter
+    return np.array([*scores, *joints, *np.concatenate(own)], dtype=np.float32)
 
 
 def stacked(env):
@@ -94,9 +100,18 @@ def test_joints_move_for_one_step_and_fingers_open_where_they_are(env):
     assert 1 <= info["steps"] - 1 <= 10
 
 
+def test_what_is_near_the_target_is_afforded_and_what_has_no_point_is_too():
+    control = PrimitiveControl(get_domain("stack_at_target", "fair"))
+    near, far, farther = (control.affordance(action("grasp", (x, 0, 0))) for x in (0.01, 0.05, 0.1))
+    assert near == pytest.approx(1.0)
+    assert 1.0 > far > farther > 0.0
+    for name in ("joints", "open"):
+        assert control.affordance(action(name, (0.1, 0.1, 0.1))) == 1.0
+
+
 def test_what_is_no_primitive_is_refused(env):
     begin(env)
-    with pytest.raises(InvalidCommandError, match="18 finite numbers"):
+    with pytest.raises(InvalidCommandError, match="30 finite numbers"):
         env.step(np.zeros(5))
     with pytest.raises(InvalidParameterError, match="no skills, so there is no mask"):
         env.action_masks()

@@ -94,6 +94,7 @@ def _target(state: State, objects: tuple[Object, ...]) -> Vector:
 
 PRIMITIVES = Primitives(
     {"reach": reach, "grasp": grasp, "place": place, "push": push, "open": open_fingers},
+    {"reach": 4, "grasp": 4, "place": 4, "push": 7, "open": 0},
     low=-HIGH,
     high=HIGH,
     target_of=_target,

@@ -50,7 +50,9 @@ and policy, and nothing is planned again. `sac` and `curriculum` are one policy 
 without a planner: each moves the joints in every step until the goal holds or the task's {limit:,}
 steps are used up. They observe all objects and the goal, and are rewarded stage by stage, dense
 within the present one. `curriculum` begins its episodes near the end of 20 demonstrations at first,
-and earlier as success rises; the steps of the demonstrations are not counted. `ours` has the
+and earlier as success rises; the steps of the demonstrations are not counted. `maple` is one policy
+too: it chooses movements of the hand and their parameters, relative to what the plan's present
+operator acts on. `ours` has the
 proposer and the rewarder of its libraries in brackets: with both *manual*, operators and rewards
 are hand-written, as LEAGUE has them, and no known skill is begun with. *Steps* are environment
 steps of a training, of all skills together; for skills, neither approaches nor the episodes in
