@@ -168,10 +168,10 @@ def _unforeseen(error: Exception) -> tuple[ErrorCode, str]:
     The file has its message, without the secrets of the environment.
     """
     what, log = type(error).__name__, _kept(error)
-    frames = list(traceback.walk_tb(error.__traceback__))
+    frames, packages = list(traceback.walk_tb(error.__traceback__)), _packages_of_domains()
     for frame, line in reversed(frames):
         package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
-        if package in _packages_of_domains():
+        if package in packages:
             return ErrorCode.INVALID_DOMAIN, (
                 f"the domain's own code fails: {what} in {_name_of(frame)}, line {line}, of the "
                 f"package {package}; the traceback is in {log}"

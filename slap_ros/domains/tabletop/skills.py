@@ -41,7 +41,7 @@ class Aim:
 
     Args:
         thing: What is to be grasped.
-        planned: Pose of it for which the motion was planned.
+        planned: Pose of it for which the motion was planned, base's frame.
     """
 
     thing: Object
