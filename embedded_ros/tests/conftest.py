@@ -85,7 +85,7 @@ class Process:
         return self._process.returncode, out, err
 
     def kill(self) -> None:
-        """Make sure it is gone; pytest shows what it wrote, and how it ended, where a test fails."""
+        """Make sure it is gone; pytest shows what it wrote, and how it ended, of a failed test."""
         code = self._process.poll()
         if code is None:
             self._process.kill()
