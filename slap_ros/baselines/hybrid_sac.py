@@ -10,7 +10,8 @@ sample (Christodoulou 2019), and each level has an entropy of its own.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -30,7 +31,8 @@ CHOICE_ENTROPY = 0.5  # of choices that SAC aims at, as a share of that of rando
 SMALLEST = 1e-6  # derivative of tanh
 
 
-class ProposedActions(NamedTuple):
+@dataclass(frozen=True)
+class ProposedActions:
     """What a policy would do in each of n states.
 
     Args:
