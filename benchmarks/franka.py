@@ -27,6 +27,7 @@ from slap_ros.api.execution import execute
 from slap_ros.api.planning import plan
 from slap_ros.domains import get_domain
 from slap_ros.errors import SlapError
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.robot.blended_run import BlendedRun
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.franka.arm import ArmReading, FrankaArm, FrankaSettings, MotionResult
@@ -36,7 +37,7 @@ from slap_ros.robot.limits import FR3, Limits, Workspace
 from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
 from slap_ros.robot.robot_world import GAP_OPEN, GripperAction
 from slap_ros.robot.stretches import Stretch
-from slap_ros.studies.comparison import format_spread, spread_of
+from slap_ros.studies.comparison import spread_of
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport
 from slap_ros.studies.study_log import StudyLog
 

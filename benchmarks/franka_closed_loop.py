@@ -29,9 +29,10 @@ from ensemble.spinner import temporary_node
 from slap_ros.errors import ErrorCode, NotReadyError, RunTimeoutError, SlapError
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.evaluation.statistics import wilson_interval
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.robot.worlds import FRANKA_SIM
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.comparison import format_spread, spread_of
+from slap_ros.studies.comparison import spread_of
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport
 from slap_ros.studies.study_log import StudyLog

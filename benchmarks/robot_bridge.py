@@ -27,11 +27,12 @@ from slap_ros.api.library_descriptions import describe_library
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.statistics import wilson_interval
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.robot.worlds import MOCK
 from slap_ros.shortcuts.shipped import NONE, shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.comparison import format_spread, spread_of
+from slap_ros.studies.comparison import spread_of
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport
 

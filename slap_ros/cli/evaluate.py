@@ -31,7 +31,7 @@ from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.evaluation_file import require_replaceable, write_evaluation
 from slap_ros.evaluation.experiment import Experiment, Trial
-from slap_ros.evaluation.summary import Spread, Summary
+from slap_ros.evaluation.summary import Summary, format_spread
 from slap_ros.files import require_writable
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
 from slap_ros.shortcuts.sampling import DEFAULT
@@ -184,17 +184,13 @@ def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
         table.add_row(
             summary.approach,
             f"{summary.success_rate:.0%} [{success.low:.0%}, {success.high:.0%}]",
-            _spread(summary.plan_length, 1),
+            format_spread(summary.plan_length, 1),
             _relative(summary),
-            _spread(summary.planning_seconds, 3),
+            format_spread(summary.planning_seconds, 3),
             f"{summary.edges_rolled_out:.1f}",
             f"{summary.shortcut_share:.0%}",
         )
     return table
-
-
-def _spread(spread: Spread | None, digits: int) -> str:
-    return "-" if spread is None else f"{spread.mean:.{digits}f} ± {spread.sd:.{digits}f}"
 
 
 def _relative(summary: Summary) -> str:

@@ -26,6 +26,11 @@ class Spread:
         return cls(fmean(values), stdev(values) if len(values) > 1 else 0.0)
 
 
+def format_spread(spread: Spread | None, digits: int) -> str:
+    """Mean ± sample standard deviation with so many digits, for a table; a dash for None."""
+    return "-" if spread is None else f"{spread.mean:.{digits}f} ± {spread.sd:.{digits}f}"
+
+
 @dataclass(frozen=True)
 class Summary:
     """The figures of an approach over all tasks of an experiment.

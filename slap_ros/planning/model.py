@@ -15,7 +15,7 @@ from slap_ros.errors import (
     SkillNotApplicableError,
     TaskCanceledError,
 )
-from slap_ros.planning.options import Option, OptionExecution, OptionResult
+from slap_ros.planning.options import Option, OptionExecution, OptionResult, never
 from slap_ros.relational import AtomSpace, State, Target
 
 REACHED = OptionResult(ErrorCode.NONE)
@@ -48,10 +48,6 @@ class Rollout:
         return self.steps > 0 and not self.reached
 
 
-def _never() -> bool:
-    return False
-
-
 class Model:
     """The known transition function (the paper's f).
 
@@ -64,7 +60,7 @@ class Model:
         world: World,
         space: AtomSpace,
         actions: ActionSpace,
-        is_canceled: Callable[[], bool] = _never,
+        is_canceled: Callable[[], bool] = never,
     ) -> None:
         """Start with an empty cache.
 
@@ -84,7 +80,7 @@ class Model:
         self._ends: dict[bytes, None] = {}  # keys of the states in which roll-outs ended
 
     @classmethod
-    def of(cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = _never) -> Self:
+    def of(cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = never) -> Self:
         """A model for the tasks over some objects.
 
         Args:

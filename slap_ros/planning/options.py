@@ -37,7 +37,8 @@ def _any(_: State) -> bool:
     return True
 
 
-def _never() -> bool:
+def never() -> bool:
+    """False: nobody cancels, and nothing is given up."""
     return False
 
 
@@ -69,7 +70,7 @@ class Option:
     accepts: Callable[[State], bool] = field(default=_any, compare=False, repr=False)
     attempt: int = 0
     next_attempt: Callable[[], Option | None] = field(default=_none, compare=False, repr=False)
-    given_up: Callable[[], bool] = field(default=_never, compare=False, repr=False)
+    given_up: Callable[[], bool] = field(default=never, compare=False, repr=False)
     deletes: int | None = field(default=None, compare=False, repr=False)
 
     def target(self, expected: int) -> Target:

@@ -13,6 +13,7 @@ from slap_ros.planning.anytime import AnytimePlanner
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.ff_planner import FFPlanner
 from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.options import never
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.planner_choice import PlannerChoice
 from slap_ros.planning.problem import Problem
@@ -100,7 +101,7 @@ def make_planner(
     domain: Domain,
     initial: State,
     shortcuts: ShortcutSource | None = None,
-    is_canceled: Callable[[], bool] = lambda: False,
+    is_canceled: Callable[[], bool] = never,
 ) -> Planner:
     """A planner by name.
 

@@ -14,7 +14,7 @@ from slap_ros.planning.astar import find_shortest_sequence
 from slap_ros.planning.failures import unreachable_atoms
 from slap_ros.planning.model import Model
 from slap_ros.planning.mutexes import never_together
-from slap_ros.planning.options import Option, given_option
+from slap_ros.planning.options import Option, given_option, never
 from slap_ros.relational import AtomSpace, GroundOperator, State, ground_operators, list_atoms
 
 GroundedOptions = tuple[tuple[GroundOperator, Option], ...]
@@ -71,9 +71,7 @@ class Problem:
     exact: bool = True
 
     @classmethod
-    def of(
-        cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = lambda: False
-    ) -> Problem:
+    def of(cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = never) -> Problem:
         """The problem over the objects of ``initial``.
 
         Args:

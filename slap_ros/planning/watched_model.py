@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from slap_ros.core import ActionSpace, World
 from slap_ros.planning.model import Model, Rollout
-from slap_ros.planning.options import Option, OptionKind
+from slap_ros.planning.options import Option, OptionKind, never
 from slap_ros.relational import AtomSpace, State, Target
 
 
@@ -23,7 +23,7 @@ class WatchedModel(Model):
         world: World,
         space: AtomSpace,
         actions: ActionSpace,
-        is_canceled: Callable[[], bool] = lambda: False,
+        is_canceled: Callable[[], bool] = never,
     ) -> None:
         """Begin with nothing noted.
 

@@ -187,8 +187,3 @@ def solve_task(setup: PlanningSetup, seed: int, index: int) -> Trial:
 def spread_of(values: Sequence[float]) -> Spread | None:
     """The spread of values; None where there are none."""
     return Spread.of(values) if values else None
-
-
-def format_spread(spread: Spread | None, digits: int) -> str:
-    """Mean ± sample standard deviation with so many digits, for a table; a dash for None."""
-    return "-" if spread is None else f"{spread.mean:.{digits}f} ± {spread.sd:.{digits}f}"

@@ -18,10 +18,9 @@ from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.evaluation.statistics import SuccessRate
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.skills.domain_choice import DomainChoice, chosen_skills, open_domain
 from slap_ros.skills.skill import LearnedSkill
-from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,

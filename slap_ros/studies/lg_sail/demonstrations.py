@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.left_out import Tell
 from slap_ros.evaluation.statistics import SuccessRate
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
-from slap_ros.studies.comparison import format_spread, not_solved, spread_of
+from slap_ros.studies.comparison import not_solved, spread_of
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import GoalNames, all_goals, with_demonstrator
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output

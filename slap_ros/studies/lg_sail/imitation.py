@@ -17,11 +17,11 @@ from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.imitation.settings import CloningSettings
 from slap_ros.imitation.unchecked_plans import UncheckedPlan, carry_out_unchecked
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill import LearnedSkill
-from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.acquisition import (
     LibrariesProgress,

@@ -16,9 +16,8 @@ from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.api.acquisition import UnwatchedCurriculum, acquirable, known_skills
 from slap_ros.api.learning_curves import CurveCallback, steps_to
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.workers import SequentialWorkers
-from slap_ros.studies.comparison import format_spread
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,9 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import SuccessRate
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.skills.skill_library import read_library_record
-from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.acquisition import PAPER as LG_SAIL

@@ -16,9 +16,10 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import Experiment, Trial, task_job, try_task
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.skills.domain_choice import DomainChoice, chosen_skills
-from slap_ros.studies.comparison import format_spread, named_tasks, not_solved
+from slap_ros.studies.comparison import named_tasks, not_solved
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,

@@ -15,10 +15,9 @@ from slap_ros.api.left_out import Tell
 from slap_ros.api.sequence_step import SequenceStep
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.work_folder import DECODING_ERRORS
 from slap_ros.skills.skill_library import read_library_record
-from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.options import RESULTS, Output
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport

@@ -22,8 +22,7 @@ from slap_ros.api.learning_curves import PLAN, steps_to
 from slap_ros.api.left_out import Tell
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import Interval, ratio_interval
-from slap_ros.evaluation.summary import Spread
-from slap_ros.studies.comparison import format_spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.learning_curves import (

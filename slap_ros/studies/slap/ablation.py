@@ -23,7 +23,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import solve
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs, learning_attempt
@@ -35,7 +35,6 @@ from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.shortcuts.training import mean_steps, rank
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import APPROACH_STYLES, LINES, label
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output

@@ -13,9 +13,9 @@ from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import PLAN
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.shortcuts.shortcut import Shortcut
-from slap_ros.studies.comparison import Comparison, format_spread, spread_of
+from slap_ros.studies.comparison import Comparison, spread_of
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport

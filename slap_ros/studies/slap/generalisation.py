@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
-from slap_ros.studies.comparison import ApproachResult, Comparison, format_spread
+from slap_ros.evaluation.summary import format_spread
+from slap_ros.studies.comparison import ApproachResult, Comparison
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport

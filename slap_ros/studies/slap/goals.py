@@ -16,14 +16,9 @@ from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.experiment import Trial, solve
-from slap_ros.evaluation.summary import Summary
+from slap_ros.evaluation.summary import Summary, format_spread
 from slap_ros.learning.random_goals import sample_goals
-from slap_ros.studies.comparison import (
-    Comparison,
-    PlanningSetup,
-    format_spread,
-    named_tasks,
-)
+from slap_ros.studies.comparison import Comparison, PlanningSetup, named_tasks
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.options import Tasks

@@ -20,12 +20,10 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shipped import shipped_libraries
 from slap_ros.shortcuts.shortcut_library import Record, ShortcutLibrary
-from slap_ros.studies.comparison import (
-    format_spread,
-)
 from slap_ros.studies.figures import LINES, label
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks

@@ -9,15 +9,9 @@ from typing import Any
 
 from slap_ros.evaluation.experiment import Trial
 from slap_ros.evaluation.statistics import ratio_interval
-from slap_ros.evaluation.summary import Spread, lengths_of_both
+from slap_ros.evaluation.summary import Spread, format_spread, lengths_of_both
 from slap_ros.shortcuts.shortcut import Shortcut
-from slap_ros.studies.comparison import (
-    Comparison,
-    format_spread,
-    named_tasks,
-    solve_task,
-    spread_of,
-)
+from slap_ros.studies.comparison import Comparison, named_tasks, solve_task, spread_of
 
 
 @dataclass(frozen=True)

@@ -18,14 +18,9 @@ from slap_ros.api.left_out import Tell
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import SuccessRate
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.skills.domain_choice import open_domain
-from slap_ros.studies.comparison import (
-    Comparison,
-    PlanningSetup,
-    format_spread,
-    named_tasks,
-)
+from slap_ros.studies.comparison import Comparison, PlanningSetup, named_tasks
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_apart
 from slap_ros.studies.replanned_trials import ReplannedTrials

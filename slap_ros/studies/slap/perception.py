@@ -17,15 +17,11 @@ import numpy as np
 
 from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.partial import PartialPlanner
-from slap_ros.studies.comparison import (
-    Comparison,
-    PlanningSetup,
-    format_spread,
-    named_tasks,
-)
+from slap_ros.studies.comparison import Comparison, PlanningSetup, named_tasks
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
 from slap_ros.studies.replanned_trials import ReplannedTrials

@@ -16,14 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.errors import PlanningLimitError, UnsolvableError
-from slap_ros.evaluation.summary import Spread
-from slap_ros.studies.comparison import (
-    Comparison,
-    PlanningSetup,
-    format_spread,
-    named_tasks,
-    spread_of,
-)
+from slap_ros.evaluation.summary import Spread, format_spread
+from slap_ros.studies.comparison import Comparison, PlanningSetup, named_tasks, spread_of
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport

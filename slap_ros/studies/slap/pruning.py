@@ -15,7 +15,7 @@ from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import MUTED, PLAN
 from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.evaluation.experiment import Trial
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.explore import ExplorationResult
@@ -23,7 +23,7 @@ from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.training import problem_key
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.comparison import Comparison, format_spread
+from slap_ros.studies.comparison import Comparison
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.job_runner import JobRunner

@@ -18,14 +18,9 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import Experiment, Trial
+from slap_ros.evaluation.summary import format_spread
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.comparison import (
-    PlanningSetup,
-    format_spread,
-    named_tasks,
-    not_solved,
-    solve_task,
-)
+from slap_ros.studies.comparison import PlanningSetup, named_tasks, not_solved, solve_task
 from slap_ros.studies.figures import LINES, label
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Output, Seeds, Tasks

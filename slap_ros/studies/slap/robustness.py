@@ -23,13 +23,13 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import Experiment, Trial
-from slap_ros.evaluation.summary import Spread
+from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.partial import PartialPlanner
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import shipped_libraries
-from slap_ros.studies.comparison import PlanningSetup, format_spread
+from slap_ros.studies.comparison import PlanningSetup
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
@@ -206,10 +206,11 @@ def prepare(
         "max_replans": options.max_replans,
     }
     experiment = Experiment(domain, options.tasks, options.seeds, options.first_seed)
-    conditions = made.hides_top, options.max_replans
     return PreparedStudy(
         {**own, "libraries": described(trained), **(settings or {})},
-        lambda runner: _study(made, experiment, (PURELY, *ways, *more), conditions, runner),
+        lambda runner: _study(
+            made, experiment, (PURELY, *ways, *more), options.max_replans, runner
+        ),
         {"library": options.libraries, **own, **(given or {})},
     )
 
@@ -244,7 +245,7 @@ def _study(
     made: RobustnessStudy,
     experiment: Experiment,
     ways: Sequence[PlannedWay],
-    conditions: tuple[bool, int],
+    max_replans: int,
     runner: JobRunner,
 ) -> StudyReport:
     """Solve every task in every way.
@@ -253,10 +254,10 @@ def _study(
         made: Study to make.
         experiment: Tasks to solve.
         ways: Ways to plan, pure planning first.
-        conditions: Whether the highest thing is hidden, and the largest number of replans.
+        max_replans: Largest number of plans after the first.
         runner: Runner of the jobs.
     """
-    trials = solved_in(ways, experiment, runner, solve_task, conditions)
+    trials = solved_in(ways, experiment, runner, solve_task, (made.hides_top, max_replans))
     rows = [RobustnessRow(row) for row in rows_of(experiment, trials)]
     return StudyReport(
         study=made.name,

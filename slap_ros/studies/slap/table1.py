@@ -23,18 +23,12 @@ from slap_ros.domains import get_domain, preset_names
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.statistics import Interval, SuccessRate, ratio_interval
-from slap_ros.evaluation.summary import Spread, lengths_of_both
+from slap_ros.evaluation.summary import Spread, format_spread, lengths_of_both
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shipped import shipped_libraries
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.comparison import (
-    PlanningSetup,
-    format_spread,
-    named_tasks,
-    not_solved,
-    solve_task,
-)
+from slap_ros.studies.comparison import PlanningSetup, named_tasks, not_solved, solve_task
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.job_runner import Job, JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks

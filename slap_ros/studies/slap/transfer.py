@@ -16,20 +16,14 @@ from slap_ros.api.left_out import Tell
 from slap_ros.core import Domain
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.experiment import Trial
-from slap_ros.evaluation.summary import Summary
+from slap_ros.evaluation.summary import Summary, format_spread
 from slap_ros.perception import ExactPerceiver
 from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.options import OptionResult
 from slap_ros.relational import State
 from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.skills.domain_choice import open_domain
-from slap_ros.studies.comparison import (
-    ApproachResult,
-    Comparison,
-    PlanningSetup,
-    format_spread,
-    named_tasks,
-)
+from slap_ros.studies.comparison import ApproachResult, Comparison, PlanningSetup, named_tasks
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
