@@ -110,7 +110,7 @@ def test_other_learners_are_those_whose_libraries_ship(name):
 def test_figures_are_of_tasks_that_development_did_not_look_at():
     # A language model is asked in the one task of its own seed, and exploration is that of a
     # training, whose tasks no evaluation has.
-    asked = {"planning_ablation", "possible_savings"}
+    asked = {"planning_ablation", "models", "reward_ablation", "possible_savings"}
     first = {
         name: data.get("first_seed", data.get("seed", FRESH_SEED))
         for name, data in RESULTS.items()

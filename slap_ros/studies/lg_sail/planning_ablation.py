@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who plans with operators of a language model: A*, the model itself, or nobody twice.
 
-LG-SAIL Table 2, and for several models Tables 5 and 6. An attempt asks once for a decomposition and
+LG-SAIL Table 2. An attempt asks once for a decomposition and
 its operators; where these chain, the plan is A*'s or is asked for as well, once. Attempts go on
 until there is a plan, or the limit of attempts is reached.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import process_time
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -323,7 +323,8 @@ def draw(figure: Figure, tallies: Mapping[tuple[str, str], PlanTrials]) -> None:
     axes.grid(visible=False, axis="x")
 
 
-def _summary(found: Data) -> str:
+def summary(found: Data) -> str:
+    """Share of good operators and of tasks with a plan, for each model and variant."""
     return "; ".join(
         f"{one['model']}, {one['variant']}: operators {_percent(one['operators'])}, "
         f"overall {_percent(one['overall'])}"
@@ -360,13 +361,6 @@ class VariantOptions(PlanningOptions):
     ] = ",".join(VARIANTS)
 
 
-@dataclass(frozen=True, kw_only=True)
-class SeveralModelsOptions(PlanningOptions):
-    """Options of the study of several models."""
-
-    plans: Plans = 100
-
-
 def prepare(options: VariantOptions, _: Tell) -> PreparedStudy:
     """Choose who plans, and open the models.
 
@@ -379,21 +373,29 @@ def prepare(options: VariantOptions, _: Tell) -> PreparedStudy:
         raise InvalidParameterError(
             f"--variants {', '.join(unknown)}: there are {', '.join(VARIANTS)}"
         )
-    return _asked(options, chosen)
+    return prepare_asking(options, chosen, {"variants": ",".join(chosen)})
 
 
-def prepare_models(options: SeveralModelsOptions, _: Tell) -> PreparedStudy:
-    """Open several models, all of which plan with search."""
-    asked = _asked(options, [SEARCH])
-    return replace(asked, make=lambda runner: replace(asked.make(runner), study="models"))
+def prepare_asking(options: PlanningOptions, variants: Sequence[str], given: Data) -> PreparedStudy:
+    """Open the models.
 
+    Args:
+        options: Which models are asked, and how much.
+        variants: Names of what plans with their operators.
+        given: Further options of the command.
 
-def _asked(options: PlanningOptions, variants: Sequence[str]) -> PreparedStudy:
+    Returns:
+        The study, ready to be made.
+
+    Raises:
+        InvalidParameterError: A model is named twice.
+        InvalidCassetteError: The cassette was not recorded from a model.
+    """
     models = options.models()
     opened = get_domain(options.domain, options.preset)
     problems = [options.problem(opened, index) for index in range(options.plans)]
     settings = {
-        "variants": ",".join(variants),
+        **given,
         "plans": options.plans,
         "attempts": options.attempts,
         "model": [*models],
@@ -411,7 +413,7 @@ STUDY = Study(
     example="slap study planning_ablation stow_hammer --model NAME",
     options=VariantOptions,
     prepare=prepare,
-    summary=_summary,
+    summary=summary,
     figures=(
         not_made(
             "LG-SAIL Table 2",
@@ -421,19 +423,4 @@ STUDY = Study(
         ),
     ),
     costs="attempts",
-)
-MODELS_STUDY = Study(
-    "models",
-    help="LG-SAIL Tables 5 and 6: operators of several language models; A* plans with them.",
-    example="slap study models stow_hammer --model NAME",
-    options=SeveralModelsOptions,
-    prepare=prepare_models,
-    figures=(
-        not_made(
-            "LG-SAIL Tables 5 and 6",
-            "operators of other language models",
-            "operators 79 to 98%",
-            "needs language models",
-        ),
-    ),
 )

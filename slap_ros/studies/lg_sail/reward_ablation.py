@@ -25,7 +25,7 @@ from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.model_attempts import Attempt, LanguageModel, attempt_rewards
 from slap_ros.studies.lg_sail.model_options import ModelOptions, answered_by
-from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.study import PreparedStudy, Study, not_made
 
 if TYPE_CHECKING:
@@ -245,12 +245,20 @@ def prepare(options: RewardOptions, _: Tell) -> PreparedStudy:
     )
 
 
+def _summary(found: Data) -> str:
+    shares = ", ".join(
+        f"{one['metrics']} {one['all_right'] / len(one['attempts']):.0%}" for one in found["trials"]
+    )
+    return f"all rewards right: {shares}"
+
+
 STUDY = Study(
     "reward_ablation",
     help="LG-SAIL Table 3, Fig. 7: rewards of a language model, and their errors.",
     example="slap study reward_ablation stow_hammer --model NAME",
     options=RewardOptions,
     prepare=prepare,
+    summary=_summary,
     figures=(
         not_made(
             "LG-SAIL Table 3, Fig. 7",
@@ -259,4 +267,5 @@ STUDY = Study(
             "needs a language model",
         ),
     ),
+    costs="attempts",
 )
