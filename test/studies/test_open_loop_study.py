@@ -30,7 +30,7 @@ def test_without_the_extra_nothing_is_played(monkeypatch, tmp_path):
 
 
 def test_a_task_without_a_plan_is_not_solved_and_counts():
-    grasp = {"closed": True, "shift_m": 0.002, "turn_rad": 0.0}
+    grasp = {"closed": True, "shift_m": 0.002, "turn_rad": 0.0, "askew_rad": 0.1}
     trials = (
         OpenLoopTrial(300, 0, planned=True, success=True, steps=80, grasps=[grasp]),
         OpenLoopTrial(300, 1, True, False, 90, int(ErrorCode.REPLAY_MISMATCH), "On(a, b)", [grasp]),
@@ -39,7 +39,7 @@ def test_a_task_without_a_plan_is_not_solved_and_counts():
     row = PlayedSkills("training", "seed 0", "digest", trials)
     assert (row.planned.successes, row.solved.successes, row.solved.trials) == (2, 1, 3)
     assert row.failures == {"REPLAY_MISMATCH": 1, "UNSOLVABLE": 1}
-    assert row.as_row()[4:] == ["2.0 mm, 0° → -", "`REPLAY_MISMATCH` 1, `UNSOLVABLE` 1"]
+    assert row.as_row()[4:] == ["6°", "2.0 mm, 0° → -", "`REPLAY_MISMATCH` 1, `UNSOLVABLE` 1"]
 
 
 @pytest.mark.timeout(180)  # plans a task twice, and plays both plans

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.geometry.pose import Pose, dot, rotate
+from slap_ros.geometry.pose import Pose, Vector, conjugate, dot, rotate
 from slap_ros.relational import Object, State
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.limits import PANDA, Limits
@@ -30,6 +30,7 @@ from slap_ros.worlds.layout_index import pose_of
 from slap_ros.worlds.panda import grasp_pose
 
 COMING_TO_REST_S = 1.0  # at the end, for what was let go
+X: Vector = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ class GraspDeviation:
         closed: Whether the fingers have just closed; else they are about to open.
         shift_m: Distance between both places in the hand, m.
         turn_rad: Angle between both directions of its x axis, which is that of what is round, rad.
+        askew_rad: Angle in the recording from the hand's x axis, along which its pads are wide, to
+            the nearest axis of the thing, rad.
     """
 
     thing: str
@@ -49,6 +52,7 @@ class GraspDeviation:
     closed: bool
     shift_m: float
     turn_rad: float
+    askew_rad: float
 
 
 class OpenLoopPlayer:
@@ -113,14 +117,21 @@ class OpenLoopPlayer:
             if state.get(thing, "held") > 0.5:
                 here = hand.inverse().compose(pose)
                 there = _pose(state, robot).inverse().compose(_pose(state, thing))
-                shift, turn = math.dist(here.position, there.position), _between_x_axes(here, there)
-                self.grasps.append(GraspDeviation(name, step, closed, shift, turn))
+                self.grasps.append(
+                    GraspDeviation(
+                        name,
+                        step,
+                        closed,
+                        math.dist(here.position, there.position),
+                        _angle(rotate(here.quaternion, X), rotate(there.quaternion, X)),
+                        math.acos(min(1.0, max(map(abs, rotate(conjugate(there.quaternion), X))))),
+                    )
+                )
 
 
-def _between_x_axes(first: Pose, second: Pose) -> float:
-    """The angle between the x axes of two frames, rad."""
-    one, other = (rotate(pose.quaternion, (1.0, 0.0, 0.0)) for pose in (first, second))
-    return math.acos(min(1.0, max(-1.0, dot(one, other))))
+def _angle(first: Vector, second: Vector) -> float:
+    """The angle between two unit vectors, rad."""
+    return math.acos(min(1.0, max(-1.0, dot(first, second))))
 
 
 def _pose(state: State, obj: Object) -> Pose:

@@ -55,16 +55,18 @@ and no pose is put right. *Planned* is the share of tasks whose goal holds in th
 interval; a task without a plan is not solved. *Not solved* counts the others by error code:
 `UNSOLVABLE` and other codes of planning, `CONTROLLER_ABORTED` (the arm was held up, or the fingers
 closed around nothing, and the robot holds), `REPLAY_MISMATCH` (played to the end, and the goal does
-not hold). *In the hand* is how far what is held is from where the recording's hand holds it, and
-how much its x axis is turned, both as medians: after the fingers have closed → before they open.
-The demonstrator's scripts know the whole state and grasp in the middle; they show what the plant
-can do. The hands differ. The contact world's has pads of 18 × 20 mm with a friction of 2.0, and
-closes at 150 mm/s; the Panda's are its real fingers with a friction of 1.0, which close at 50 mm/s
-with the same force, while the arm stands. So they close where the recording's fingers have met
+not hold). *Askew* is the angle between the recording's hand and what it has grasped, to the nearest
+axis. *In the hand* is how far what is held is from where the recording's hand holds it, and how
+much its x axis is turned: after the fingers have closed → before they open. Both are medians. The
+first library is the one that ships; others were trained with other seeds and rewards. The
+demonstrator's scripts know the whole state and grasp straight, in the middle; they show what the
+plant can do. The hands differ. The contact world's has pads of 18 × 20 mm with a friction of 2.0,
+and closes at 150 mm/s; the Panda's are its real fingers with a friction of 1.0, which close at 50
+mm/s with the same force, while the arm stands. So they close where the recording's fingers have met
 something, not where they were told to close. Of two bodies that touch, the rougher one counts in
-MuJoCo; in the contact world, coefficients multiply. The arm's links touch things in MuJoCo alone.
-A skill can therefore rest on what only one of the two hands can do."""
-COLUMNS = ("goal", "skills", "planned", "solved", "in the hand", "not solved")
+MuJoCo; in the contact world, coefficients multiply. The arm's links touch things in MuJoCo alone. A
+skill can therefore rest on what only one of the two hands can do."""
+COLUMNS = ("goal", "skills", "planned", "solved", "askew", "in the hand", "not solved")
 
 
 @dataclass(frozen=True)
@@ -178,19 +180,18 @@ class PlayedSkills:
         failed = [trial for trial in self.trials if not trial.success]
         return Counter(ErrorCode(trial.error_code).name for trial in failed)
 
-    def in_hand(self, closed: bool) -> tuple[float, float] | None:
-        """How far things lie from where the recording's hand has them, m, and how turned, rad.
+    def in_hand(self, closed: bool) -> dict[str, float]:
+        """How things lie in the hand, beside how they lie in the recording's.
 
         Args:
             closed: Whether fingers have just closed; else they are about to open.
 
         Returns:
-            Medians; None where nothing was held.
+            Medians of the deviations, by name; none where nothing was held.
         """
         found = [g for trial in self.trials for g in trial.grasps if g["closed"] == closed]
-        if not found:
-            return None
-        return median(g["shift_m"] for g in found), median(g["turn_rad"] for g in found)
+        names = ("shift_m", "turn_rad", "askew_rad") if found else ()
+        return {name: median(one[name] for one in found) for name in names}
 
     def as_json(self) -> dict[str, Any]:
         """The summary, and every trial."""
@@ -210,21 +211,22 @@ class PlayedSkills:
     def as_row(self) -> list[str]:
         """Row of a table."""
         failures = [f"`{name}` {count}" for name, count in self.failures.most_common()]
+        closed, opening = (self.in_hand(closed) for closed in (True, False))
         return [
             self.goal or "(the task's own)",
             self.skills,
             f"{self.planned.successes} of {self.planned.trials}",
             f"{self.solved.successes} of {self.solved.trials} ({self.solved})",
-            " → ".join(_in_words(self.in_hand(closed)) for closed in (True, False)),
+            f"{math.degrees(closed['askew_rad']):.0f}°" if closed else "-",
+            f"{_in_words(closed)} → {_in_words(opening)}",
             ", ".join(failures) or "none",
         ]
 
 
-def _in_words(in_hand: tuple[float, float] | None) -> str:
-    if in_hand is None:
+def _in_words(in_hand: Mapping[str, float]) -> str:
+    if not in_hand:
         return "-"
-    shift_m, turn_rad = in_hand
-    return f"{1e3 * shift_m:.1f} mm, {math.degrees(turn_rad):.0f}°"
+    return f"{1e3 * in_hand['shift_m']:.1f} mm, {math.degrees(in_hand['turn_rad']):.0f}°"
 
 
 def study(
