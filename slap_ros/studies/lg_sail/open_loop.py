@@ -57,15 +57,15 @@ interval; a task without a plan is not solved. *Not solved* counts the others by
 closed around nothing, and the robot holds), `REPLAY_MISMATCH` (played to the end, and the goal does
 not hold). *Askew* is the angle between the recording's hand and what it has grasped, to the nearest
 axis. *In the hand* is how far what is held is from where the recording's hand holds it, and how
-much its x axis is turned: after the fingers have closed → before they open. Both are medians. The
-first library is the one that ships; others were trained with other seeds and rewards. The
-demonstrator's scripts know the whole state and grasp straight, in the middle; they show what the
-plant can do. The hands differ. The contact world's has pads of 18 × 20 mm with a friction of 2.0,
-and closes at 150 mm/s; the Panda's are its real fingers with a friction of 1.0, which close at 50
-mm/s with the same force, while the arm stands. So they close where the recording's fingers have met
-something, not where they were told to close. Of two bodies that touch, the rougher one counts in
-MuJoCo; in the contact world, coefficients multiply. The arm's links touch things in MuJoCo alone. A
-skill can therefore rest on what only one of the two hands can do."""
+much its x axis is turned: after the fingers have closed → before they open. Both are medians.
+Skills are named by what proposed their operators, what made their rewards, and the seed of their
+training. The demonstrator's scripts know the whole state and grasp straight, in the middle; they
+show what the plant can do. The hands differ. The contact world's has pads of 18 × 20 mm with a
+friction of 2.0, and closes at 150 mm/s; the Panda's are its real fingers with a friction of 1.0,
+which close at 50 mm/s with the same force, while the arm stands. So they close where the
+recording's fingers have met something, not where they were told to close. Of two bodies that touch,
+the rougher one counts in MuJoCo; in the contact world, coefficients multiply. The arm's links touch
+things in MuJoCo alone. A skill can therefore rest on what only one of the two hands can do."""
 COLUMNS = ("goal", "skills", "planned", "solved", "askew", "in the hand", "not solved")
 
 
@@ -293,8 +293,18 @@ def draw(figure: Figure, rows: Sequence[PlayedSkills]) -> None:
 
 
 def _summary(found: Data) -> str:
-    rows = [f"{row['goal']}, {row['skills']}: {row['solved']}" for row in found["rows"]]
-    return f"in MuJoCo, of {len(found['rows'][0]['trials'])} tasks each: {'; '.join(rows)}"
+    """Solved tasks of every goal, with the first library, the others and the demonstrator."""
+    goals: dict[str, list[Data]] = {}
+    for row in found["rows"]:
+        goals.setdefault(row["goal"], []).append(row)
+    return "in MuJoCo, " + "; ".join(map(_of_goal, goals.values()))
+
+
+def _of_goal(rows: Sequence[Data]) -> str:
+    first, *others, shown = (row["solved"] for row in rows)
+    besides = f"{min(others)} to {max(others)} with other libraries, " if others else ""
+    tasks = len(rows[0]["trials"])
+    return f"{rows[0]['goal']}: {first} of {tasks}, {besides}{shown} with {DEMONSTRATED}"
 
 
 @dataclass(frozen=True, kw_only=True)
