@@ -363,7 +363,7 @@ STUDY = Study(
             "LG-SAIL Fig. 8",
             "open loop: theirs on a real robot, ours in MuJoCo",
             ("stack_at_target",),
-            {"": "0.8 and 1.0 of 10 trials"},
+            {"stack_at_target": "0.8 and 1.0 of 10 trials"},
         ),
     ),
     costs="planning and simulation",
