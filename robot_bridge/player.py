@@ -40,7 +40,7 @@ from slap_ros.relational import State
 from slap_ros.robot.blended_run import BlendedRun
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
-from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GRASPED, GripperAction
+from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.stretches import Stretch
 from slap_ros.worlds.features import POSE_FEATURES
 
@@ -172,13 +172,9 @@ class Player(Node):
 
     async def _grip(self, waypoint: RecordedWaypoint) -> None:
         closing = waypoint.gripper is GripperAction.CLOSE
-        wanted = GAP_SHUT if closing else GAP_OPEN
-        gap = await self._robot.move_fingers(wanted)
-        if closing and gap < GRASPED * waypoint.gap:
-            raise ControllerAbortedError(
-                f"the fingers closed around nothing in step {waypoint.step}: {gap:.3f} m apart, "
-                f"{waypoint.gap:.3f} m in the recording"
-            )
+        gap = await self._robot.move_fingers(GAP_SHUT if closing else GAP_OPEN)
+        if closing:
+            waypoint.require_grasp(gap)
 
     async def _require_at(self, joints: tuple[float, ...], when: str) -> None:
         """Wait for new joint positions, which must be where the recording had the arm."""

@@ -8,16 +8,18 @@ recorded states one after the other, each from rest to rest, and what the grippe
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
-from slap_ros.errors import DamagedBagError, InvalidParameterError
+from slap_ros.errors import ControllerAbortedError, DamagedBagError, InvalidParameterError
 from slap_ros.messages.decode import decode_goal, decode_state
-from slap_ros.relational import Object, State
+from slap_ros.relational import GroundAtom, Object, State
+from slap_ros.robot.grasp_tracking import GRASPED
 from slap_ros.robot.limits import Joints, Limits
 from slap_ros.robot.robot_world import GripperAction
 from slap_ros.worlds.contact.arm import MAX_JOINT_STEP
@@ -37,6 +39,21 @@ class RecordedWaypoint:
     gripper: GripperAction
     gap: float  # m, between the fingers around what is held; 0 where nothing is
 
+    def require_grasp(self, gap: float) -> None:
+        """Refuse fingers that closed around nothing, unless those of the recording did as well.
+
+        Args:
+            gap: Distance between the fingers once they have closed, m.
+
+        Raises:
+            ControllerAbortedError: They are closer together than around what should be there.
+        """
+        if gap < GRASPED * self.gap:
+            raise ControllerAbortedError(
+                f"the fingers closed around nothing in step {self.step}: {gap:.3f} m apart, "
+                f"{self.gap:.3f} m in the recording"
+            )
+
 
 @dataclass(frozen=True)
 class RecordedMotion:
@@ -48,6 +65,28 @@ class RecordedMotion:
     states: tuple[State, ...]  # from the first on
     waypoints: tuple[RecordedWaypoint, ...]  # one for each state but the first
     goal: int  # mask, in the atom space of the first state
+
+    @classmethod
+    def of(
+        cls,
+        domain: Domain,
+        seed: int,
+        index: int,
+        states: Sequence[State],
+        goal: Iterable[GroundAtom],
+    ) -> RecordedMotion:
+        """The motion of the arm through states.
+
+        Args:
+            domain: Domain with a Panda.
+            seed: Seed of the task.
+            index: Index of the task.
+            states: States of the episode, from the first on.
+            goal: Goal of the task.
+        """
+        space = domain.atom_space(states[0])
+        waypoints = _pressing(states) if HAND_OF_FORCES in domain.types else _waypoints(states)
+        return cls(domain, seed, index, tuple(states), tuple(waypoints), space.mask(goal))
 
     @property
     def start(self) -> Joints:
@@ -90,15 +129,8 @@ def read_recorded_motion(path: Path, namespace: str | None = None) -> RecordedMo
         raise InvalidParameterError(
             f"{path} begins with something in the hand, which cannot be put there just so"
         )
-    space = domain.atom_space(states[0])
-    return RecordedMotion(
-        domain,
-        task.seed,
-        task.index,
-        states,
-        tuple(_pressing(states) if HAND_OF_FORCES in domain.types else _waypoints(states)),
-        space.mask(decode_goal(task.goal, space)),
-    )
+    goal = decode_goal(task.goal, domain.atom_space(states[0]))
+    return RecordedMotion.of(domain, task.seed, task.index, states, goal)
 
 
 def _states(episode: RecordedEpisode, domain: Domain) -> Iterator[State]:
@@ -124,16 +156,24 @@ def _waypoints(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
 
 
 def _pressing(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
-    """Waypoints of a hand that acts by forces: fingers close for some steps before they hold."""
-    told = [float(state.get(_robot(state), GRIPPER.name)) for state in states]
+    """Waypoints of a hand that acts by forces, whose fingers take some steps to close.
+
+    A robot's fingers close while its arm stands. So they do where those of the recording have met
+    something: until then, the hand may still come down. They open where they were told to.
+    """
+    told = [float(state.get(_robot(state), GRIPPER.name)) > 0.0 for state in states]
+    acts, gap = {}, 0.0
+    for step, (before, now) in enumerate(pairwise(told), start=1):
+        if before and not now:
+            acts[step] = GripperAction.OPEN, 0.0
+        elif now and not before:
+            opened = next((k for k in range(step, len(told)) if not told[k]), len(told))
+            met = next((k for k in range(step, opened) if _holds(states[k])), None)
+            closes = step if met is None else min(met + 1, opened - 1)
+            acts[closes] = GripperAction.CLOSE, 0.0 if met is None else _gap(states[met])
     for step, state in enumerate(states[1:], start=1):
-        gripper, gap = GripperAction.KEEP, 0.0
-        if told[step] != told[step - 1]:
-            gripper = GripperAction.CLOSE if told[step] > 0.0 else GripperAction.OPEN
-        if told[step] > 0.0:
-            opened = next((k for k in range(step, len(told)) if told[k] < 0.0), len(told))
-            gap = next(map(_gap, filter(_holds, states[step:opened])), 0.0)
-        yield RecordedWaypoint(step, _joints(state), gripper, gap)
+        action, gap = acts.get(step, (GripperAction.KEEP, gap))
+        yield RecordedWaypoint(step, _joints(state), action, gap)
 
 
 def _gap(state: State) -> float:

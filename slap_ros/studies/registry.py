@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All studies, and those figures of the papers that none of them makes."""
+"""All studies, and the figures of the papers that they make."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from slap_ros.studies.lg_sail import (
@@ -15,6 +15,7 @@ from slap_ros.studies.lg_sail import (
     imitation,
     induction,
     models,
+    open_loop,
     planning_ablation,
     progress,
     replanning,
@@ -43,7 +44,7 @@ from slap_ros.studies.slap import (
     table1,
     transfer,
 )
-from slap_ros.studies.study import PaperFigure, Study, not_made
+from slap_ros.studies.study import PaperFigure, Study
 
 STUDIES: Mapping[str, Study[Any]] = {
     study.name: study
@@ -67,6 +68,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         replanning.STUDY,
         progress.STUDY,
         imitation.STUDY,
+        open_loop.STUDY,
         warm_start.STUDY,
         acquisition_ablation.STUDY,
         retrieval.STUDY,
@@ -81,22 +83,12 @@ STUDIES: Mapping[str, Study[Any]] = {
         ablation.STUDY,
     )
 }
-WITHOUT_STUDY = (
-    not_made(
-        "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was available"
-    ),
-)
 
 
 def paper_figures() -> list[tuple[str, PaperFigure]]:
-    """Every figure of the papers with the name of its study, which may be empty, in their order."""
-    return sorted(_figures(), key=lambda pair: _place(pair[1].source))
-
-
-def _figures() -> Iterator[tuple[str, PaperFigure]]:
-    for study in STUDIES.values():
-        yield from ((study.name, figure) for figure in study.figures)
-    yield from (("", figure) for figure in WITHOUT_STUDY)
+    """Every figure of the papers with the name of its study, in their order."""
+    figures = [(study.name, figure) for study in STUDIES.values() for figure in study.figures]
+    return sorted(figures, key=lambda pair: _place(pair[1].source))
 
 
 def _place(source: str) -> tuple[bool, bool, int]:

@@ -166,7 +166,7 @@ def _rows_of(
         if one is not None:
             rest = [one.link, one.command, one.found, papers, one.trials, one.core_hours]
         else:
-            command = f"`slap study {study} {domain or 'DOMAIN'}`" if study else ""
+            command = f"`slap study {study} {domain or 'DOMAIN'}`"
             reason = f"{NOT_RUN}: {figure.not_run}" if figure.not_run else NOT_RUN
             rest = [domain, command, reason, papers, "", ""]
         yield [*about, *rest]

@@ -13,32 +13,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from slap_ros.core import Action, Domain
-from slap_ros.errors import (
-    ControllerAbortedError,
-    ControllerTimeoutError,
-    InvalidStateError,
-    NoDetectionError,
-)
+from slap_ros.errors import InvalidStateError, NoDetectionError
 from slap_ros.relational import GroundAtom, State
-from slap_ros.robot.finger_tracking import FingerTracker
 from slap_ros.robot.joint_reading import JointReading
-from slap_ros.robot.joint_trajectory import TrajectoryPoint
-from slap_ros.robot.limits import PANDA, JointMotion, Limits, Workspace
+from slap_ros.robot.limits import PANDA, Limits
 from slap_ros.robot.mujoco.arm import FINGER_FORCE, PERIOD_S
 from slap_ros.robot.mujoco.detectors import ExactDetector, ObjectDetector
+from slap_ros.robot.mujoco.plant_controllers import REACH, TOLERANCES, PlantControllers
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
 from slap_ros.robot.tracking import TrackingSettings
-from slap_ros.robot.trajectory_tracking import (
-    TrajectoryCode,
-    TrajectoryTolerances,
-    TrajectoryTracker,
-)
-from slap_ros.worlds.panda import JOINTS
-
-REACH = Workspace((-0.9, -0.9, -0.4), (0.9, 0.9, 1.2))  # m: all that the arm reaches
-TOLERANCES = TrajectoryTolerances((0.2,) * JOINTS, (0.05,) * JOINTS, goal_time_s=1.0)
-STILL = (0.0,) * JOINTS
-GRIPPER_TIMEOUT_S = 5.0  # that the fingers may take, as long as the bridge waits
+from slap_ros.robot.trajectory_tracking import TrajectoryTolerances
 
 
 @dataclass(frozen=True)
@@ -93,7 +77,9 @@ class ClosedLoopWorld:
         self._detector = detector or ExactDetector(domain, initial)
         self.plant = self._detector.plant
         self._robot = RobotWorld(domain, self._detector.config, settings.limits, settings.tracking)
-        self._arm, self._fingers = TrajectoryTracker(self.plant.joints), FingerTracker()
+        self._controllers = PlantControllers(
+            self.plant, settings.tolerances, settings.finger_force, self._watch
+        )
         self._detected_s = self.plant.time_s
         self._state = self._measured(self.plant.time_s, self._robot.measure_first)
 
@@ -118,7 +104,7 @@ class ClosedLoopWorld:
         """
         command = self._robot.plan_command(action)
         self._actuate(command.gripper)
-        self._move(command.motion)
+        self._controllers.move(command.motion)
         self._state = self._measured(self.plant.time_s, self._robot.measure)
         return self._state
 
@@ -138,35 +124,12 @@ class ClosedLoopWorld:
     def _actuate(self, action: GripperAction) -> None:
         """As the bridge does: what closes around nothing is opened again."""
         if action is GripperAction.CLOSE:
-            self._move_fingers(GAP_SHUT)
+            self._controllers.move_fingers(GAP_SHUT)
             if self._robot.confirm_grasp(self.plant.gap):
                 return
         if action is not GripperAction.KEEP:
-            self._move_fingers(GAP_OPEN)
+            self._controllers.move_fingers(GAP_OPEN)
             self._robot.confirm_release()
-
-    def _move_fingers(self, gap: float) -> None:
-        plant = self.plant
-        plant.command_fingers(0.5 * gap, self._settings.finger_force)
-        self._fingers.start(gap, plant.time_s)
-        until_s = plant.time_s + GRIPPER_TIMEOUT_S
-        while self._fingers.check(plant.time_s, plant.gap, plant.gap_velocity) is None:
-            if plant.time_s > until_s:
-                raise ControllerTimeoutError(f"the fingers still move after {GRIPPER_TIMEOUT_S} s")
-            self._pass_period()
-
-    def _move(self, motion: JointMotion) -> None:
-        plant = self.plant
-        points = [TrajectoryPoint(motion.duration_s, motion.target, STILL, STILL)]
-        velocities = plant.joint_velocities
-        self._arm.start(points, self._settings.tolerances, plant.time_s, plant.joints, velocities)
-        while True:
-            self._pass_period()
-            outcome = self._arm.check(plant.time_s, plant.joints, plant.joint_velocities)
-            if outcome is not None and outcome.code is not TrajectoryCode.SUCCESSFUL:
-                raise ControllerAbortedError(f"a motion: {outcome.code.name}, {outcome.reason}")
-            if outcome is not None:
-                return
 
     def _measured(self, since_s: float, measure: Callable[[float, bool], State | None]) -> State:
         """The state since a time, s, once it is known."""
@@ -186,18 +149,21 @@ class ClosedLoopWorld:
 
     def _pass_period(self) -> bool:
         """Let a period pass; whether something was measured at its end."""
+        before_s = self._detected_s
+        self._controllers.pass_period()
+        return self._detected_s > before_s
+
+    def _watch(self) -> None:
+        """Measure joints and objects as often as the detector does."""
         plant = self.plant
-        plant.command(self._arm.command(plant.time_s))
-        plant.step()
         if plant.time_s - self._detected_s < self._detector.period_s - 0.5 * PERIOD_S:
-            return False
+            return
         self._detected_s = now_s = plant.time_s
         self._robot.add_joint_reading(
             JointReading(now_s, tuple(plant.joints), tuple(plant.joint_velocities), plant.gap)
         )
-        if not self._arm.busy:  # what is detected on the way counts for nothing
+        if not self._controllers.arm_moves:  # what is detected on the way counts for nothing
             self._look(now_s)
-        return True
 
     def _look(self, now_s: float) -> None:
         detected = self._detector.detect()

@@ -8,14 +8,14 @@ the same model, the next periods are the same, bit for bit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core import Domain
-from slap_ros.geometry.pose import Pose
+from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.relational import State
 from slap_ros.robot.mujoco.arm import (
     ARM_JOINTS,
@@ -27,14 +27,19 @@ from slap_ros.robot.mujoco.arm import (
 )
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
-from slap_ros.worlds.joint_space.scene import Scene
-from slap_ros.worlds.joint_space.snapshot import SceneIndex
-from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINTS
+from slap_ros.robot.mujoco.placed_scene import PandaScene, PlacedScene
+from slap_ros.worlds.contact.contacts import ContactPoint, Side, Surface, grasped
+from slap_ros.worlds.layout_index import BodyState
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINTS, grasp_pose
 
 SETTLING_S = 0.3  # s, at least, before anything is measured
 LONGEST_SETTLING_S = 3.0  # s
 STOPPED = 3e-3  # m, by which fingers are behind that something stops; in the air, it is 1e-3
 RESTING = 1e-3  # m/s, rad/s: what is slower stands still
+FINGERS = {  # by the names of their links
+    "panda_leftfinger": Surface(Side.LEFT_FINGER),
+    "panda_rightfinger": Surface(Side.RIGHT_FINGER),
+}
 
 Array = NDArray[np.float64]
 
@@ -48,7 +53,7 @@ class MujocoPlant:
         state: State to begin in; what moves there comes to rest first.
     """
 
-    def __init__(self, model: Any, scene: Scene, state: State) -> None:
+    def __init__(self, model: Any, scene: PandaScene, state: State) -> None:
         self._model, self._data = model, mujoco.MjData(model)
         self._names = [body.name for body in scene.free]
         self._bodies = [model.body(name).id for name in self._names]
@@ -56,11 +61,13 @@ class MujocoPlant:
         self._arm_speeds = [model.joint(name).dofadr[0] for name in ARM_JOINTS]
         self._fingers_at = [model.joint(name).qposadr[0] for name in FINGER_JOINTS]
         self._finger_speeds = [model.joint(name).dofadr[0] for name in FINGER_JOINTS]
-        snapshot = SceneIndex.of(scene, state.layout).read(state)
-        self._data.qpos[self._arm_at] = snapshot.joints
-        self._data.qpos[self._fingers_at] = snapshot.finger
-        self.command(snapshot.joints)
-        self.command_fingers(FINGER_OPEN if snapshot.held is None else FINGER_CLOSED)
+        free = {name: Surface(Side.FREE, i) for i, name in enumerate(self._names)}
+        self._surfaces = {model.body(name).id: one for name, one in (FINGERS | free).items()}
+        begun = PlacedScene.of(scene, state)
+        self._data.qpos[self._arm_at] = begun.joints
+        self._data.qpos[self._fingers_at] = begun.fingers
+        self.command(begun.joints)
+        self.command_fingers(FINGER_CLOSED if begun.closing else FINGER_OPEN)
         self._settle()
 
     @classmethod
@@ -112,6 +119,34 @@ class MujocoPlant:
             name: _pose(self._data.xpos[body], self._data.xquat[body])
             for name, body in zip(self._names, self._bodies, strict=True)
         }
+
+    def motions(self) -> dict[str, BodyState]:
+        """Where what can move is, and how fast, by name."""
+        found, velocity = {}, np.zeros(6)
+        for (name, pose), body in zip(self.poses().items(), self._bodies, strict=True):
+            kind = mujoco.mjtObj.mjOBJ_BODY
+            mujoco.mj_objectVelocity(self._model, self._data, kind, body, velocity, 0)
+            spin, speed = _vector(velocity[:3]), _vector(velocity[3:])
+            found[name] = BodyState(pose, speed, spin)
+        return found
+
+    def grasped(self) -> str | None:
+        """What both fingers press on from opposite sides, by name; None where that is nothing."""
+        held = grasped(self._contact_points(), grasp_pose(self.joints))
+        return None if held is None else self._names[held]
+
+    def _contact_points(self) -> Iterator[ContactPoint]:
+        """Where fingers and what can move touch one another."""
+        force = np.zeros(6)
+        for i in range(self._data.ncon):
+            contact = self._data.contact[i]
+            first, second = (self._surfaces.get(b) for b in self._model.geom_bodyid[contact.geom])
+            if first is None or second is None:
+                continue
+            mujoco.mj_contactForce(self._model, self._data, i, force)
+            normal = _vector(-contact.frame[:3])  # MuJoCo's is towards the second one
+            position, distance = _vector(contact.pos), float(contact.dist)
+            yield ContactPoint(first, second, position, normal, distance, float(force[0]))
 
     @property
     def positions(self) -> Array:
@@ -172,9 +207,13 @@ class MujocoPlant:
 
 
 def _pose(position: Array, quaternion: Array) -> Pose:
-    x, y, z = position.tolist()
     w, qx, qy, qz = quaternion.tolist()
-    return Pose((x, y, z), (qx, qy, qz, w))
+    return Pose(_vector(position), (qx, qy, qz, w))
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = values.tolist()
+    return (x, y, z)
 
 
 __all__ = ["PERIOD_S", "MujocoPlant"]
