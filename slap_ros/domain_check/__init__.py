@@ -35,6 +35,7 @@ def check_domain(
     rng = np.random.default_rng([CHECK_SEED, seed])
     yield cost.import_time(domain)
     yield tasks.different(domain, CHECK_SEED + seed, task_count)
+    yield tasks.names(domain, CHECK_SEED + seed)
     yield atoms.shapes(domain, CHECK_SEED + seed)
     if domain.acquisition is not None:
         yield from acquisition.parts(domain, domain.acquisition)
@@ -48,6 +49,7 @@ def check_domain(
     experience = gather(domain, start, solved.episodes, state_count, rng)
     yield markov.reset(domain, experience)
     yield markov.repeat(domain, experience, rng)
+    yield atoms.unread(domain, experience)
     yield atoms.margins(domain, experience)
     yield atoms.thresholds(domain, CHECK_SEED + seed, task_count)
     yield skills.lower_bounds(solver, solved)
