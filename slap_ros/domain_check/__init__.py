@@ -10,7 +10,7 @@ import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.doctor.check import Check
-from slap_ros.domain_check import acquisition, atoms, cost, markov, skills, tasks
+from slap_ros.domain_check import acquisition, atoms, cost, learner, markov, skills, tasks
 from slap_ros.domain_check.experience import Experience, gather
 
 __all__ = ["CHECK_SEED", "Experience", "check_domain", "gather"]
@@ -54,4 +54,6 @@ def check_domain(
     yield atoms.thresholds(domain, CHECK_SEED + seed, task_count)
     yield skills.lower_bounds(solver, solved)
     yield skills.deterministic(solver, solved)
+    if domain.learning is not None:
+        yield learner.interface(domain, domain.learning.interface, experience)
     yield from cost.speed(domain, experience)

@@ -127,6 +127,39 @@ def test_a_predicate_that_changes_though_no_operator_says_so_is_found():
     assert found.found.startswith("Lifted counts as static, as no operator changes it, but Lifted(")
 
 
+ASKED = FLAT.learning.interface
+
+
+@pytest.mark.parametrize(
+    ("answers", "found"),
+    [
+        ({"hand": lambda s: s.data}, "raises "),
+        (
+            {"robot": lambda s, h: h[0]},
+            r"robot has the shape \(\d\,\) for 8 states, wanted \(8, k\)",
+        ),
+        ({"objects": lambda s, h, c: np.ones((8, 2))}, r"objects of \w+ has the shape \(8, 2\)"),
+        (
+            {"objects": lambda *given: np.nan * ASKED.objects(*given)},
+            "objects of blocks is not finite everywhere",
+        ),
+        (
+            {"distance": lambda *given: ASKED.distance(*given)[:, 0]},
+            r"distance of blocks has the shape \(8,\) for 8 states, wanted \(8, \d\)",
+        ),
+        ({"separation": lambda *given: ASKED.separation(*given)[0]}, "separation of blocks has"),
+        ({"at_rest": lambda s: True}, r"at_rest has the shape \(\)"),
+        ({"grasping": frozenset({"Holding"})}, "grasping has Holding, which the domain does not"),
+    ],
+)
+def test_a_learners_interface_that_no_learner_could_use_is_found(answers, found):
+    changed = replace(ASKED, **answers)
+    domain = replace(FLAT, learning=replace(FLAT.learning, interface=changed))
+    check = findings(domain, tasks=1)["learner's interface"]
+    assert check.status == "problem"
+    assert re.match(found, check.found)
+
+
 def test_names_that_no_node_could_write_are_found():
     found = findings(replace(FLAT, name="obstacle 2d"), tasks=1)["names"]
     assert found.status == "problem"
