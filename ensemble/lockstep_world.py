@@ -189,11 +189,10 @@ class LockstepWorld(Node, ABC, Generic[P]):
         try:
             self._show(state, stamp)
         except Exception as raised:  # of a domain's code: nobody but people misses the picture
-            error = domain_error(self, self._domain.name, raised)
-            if (
-                self.context.ok()
-            ):  # else nothing can be published any more, and it is nobody's fault
-                self.get_logger().error(f"not shown: {error}", throttle_duration_sec=QUIET)
+            # Without a context nothing can be published any more, and it is nobody's fault.
+            if self.context.ok() and self._is_due("picture"):
+                error = domain_error(self, self._domain.name, raised)
+                self.get_logger().error(f"not shown: {error}")
 
     # -- episodes -------------------------------------------------------------------------------
 
@@ -264,10 +263,16 @@ class LockstepWorld(Node, ABC, Generic[P]):
 
     def _warn(self, kind: str, words: str) -> None:
         """Log a warning, unless one of its kind was logged a moment ago."""
-        now_s = monotonic()
-        if now_s - self._warned_s.get(kind, -QUIET) >= QUIET:
-            self._warned_s[kind] = now_s
+        if self._is_due(kind):
             self.get_logger().warning(words)
+
+    def _is_due(self, kind: str) -> bool:
+        """Whether nothing of a kind was logged a moment ago; then it counts as logged now."""
+        now_s = monotonic()
+        due = now_s - self._warned_s.get(kind, -QUIET) >= QUIET
+        if due:
+            self._warned_s[kind] = now_s
+        return due
 
     def _now(self) -> Time:
         return self.get_clock().now().to_msg()

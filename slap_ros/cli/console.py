@@ -177,8 +177,10 @@ def _unforeseen(error: Exception) -> tuple[ErrorCode, str]:
                 f"package {package}; the traceback is in {log}"
             )
     place = f" in {_name_of(frames[-1][0])}, line {frames[-1][1]}" if frames else ""
+    used = sorted(packages & set(sys.modules))
+    whose = f", or of what the package {' or '.join(used)} gives it" if used else ""
     return ErrorCode.INTERNAL_ERROR, (
-        f"this is a fault of slap: {what}{place}; please report it with {log}"
+        f"this is a fault of slap{whose}: {what}{place}; please report it with {log}"
     )
 
 

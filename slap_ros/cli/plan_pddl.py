@@ -4,14 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from slap_ros.cli.console import console, print_json
-from slap_ros.errors import InvalidParameterError, PlanningLimitError
+from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.files import read_bytes
 from slap_ros.planning.greedy import find_plan
 from slap_ros.relational.pddl import PddlDomain, PddlProblem, parse_domain, parse_problem
+from slap_ros.relational.pddl.ground_task import GroundTask
 from slap_ros.relational.pddl.grounder import MAX_BINDINGS, ground_task
 from slap_ros.relational.pddl.tokens import decode
 
@@ -109,21 +111,39 @@ def plan_symbolically(
             f"{OTHER_PLANNERS}NAME"
         )
     task = ground_task(domain, problem, effort * MAX_BINDINGS)
-    if planner == "astar":
-        from slap_ros.planning.least_cost import find_cheapest_plan
-
-        actions, is_cheapest = find_cheapest_plan(task, effort).actions, True
-    else:
-        actions = find_plan(task, effort)
-        is_cheapest = not actions
-        if problem.minimises_cost and planner != "ff":
-            from slap_ros.planning.least_cost import make_cheaper
-
-            best = make_cheaper(task, actions, effort)
-            actions, is_cheapest = best.actions, best.is_cheapest
+    try:
+        actions, is_cheapest = _search(task, planner, effort, problem.minimises_cost)
+    except UnsolvableError as error:
+        raise UnsolvableError(f"{error}{_left_out(task)}") from error
     cost = sum(task.actions[index].cost for index in actions)
     steps = tuple(task.actions[index].name for index in actions)
     return SymbolicPlan(steps, cost if problem.minimises_cost else None, is_cheapest)
+
+
+def _search(
+    task: GroundTask, planner: str, effort: int, minimises_cost: bool
+) -> tuple[Sequence[int], bool]:
+    """Indices of the plan's actions, and whether no plan is cheaper."""
+    if planner == "astar":
+        from slap_ros.planning.least_cost import find_cheapest_plan
+
+        return find_cheapest_plan(task, effort).actions, True
+    actions = find_plan(task, effort)
+    if not minimises_cost or planner == "ff":
+        return actions, not actions
+    from slap_ros.planning.least_cost import make_cheaper
+
+    best = make_cheaper(task, actions, effort)
+    return best.actions, best.is_cheapest
+
+
+def _left_out(task: GroundTask) -> str:
+    """Which operators had no cost, in words; empty for none."""
+    if not task.without_cost:
+        return ""
+    first, *others = task.without_cost
+    more = f" and {len(others)} more" if others else ""
+    return f"; left out, as :init does not give what their cost is made of: {first}{more}"
 
 
 def read_pddl(path: Path) -> str:

@@ -142,10 +142,12 @@ class ActionSpace:
             InvalidCommandError: Wrong length, not finite, or out of range; names the axis.
         """
         low, high = self._bounds
-        if action.shape != low.shape:
+        if not isinstance(action, np.ndarray) or action.shape != low.shape:
+            shape = getattr(action, "shape", None)
+            got = f"{type(action).__name__}, not an array" if shape is None else f"shape {shape}"
             raise InvalidCommandError(
                 f"a command has {low.size} entries ({', '.join(a.name for a in self.axes)}), "
-                f"got shape {action.shape}"
+                f"got {got}"
             )
         inside = (action >= low) & (action <= high)  # False for NaN too
         if not inside.all():

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from numbers import Real
 
 import numpy as np
 
@@ -60,6 +62,16 @@ class Execution:
     settle: Callable[[State], State] = lambda state: state
     lift: Callable[[State], State] = lambda state: state
 
+    def __post_init__(self) -> None:
+        """Check the period.
+
+        Raises:
+            InvalidDomainError: It is not a number above 0.
+        """
+        period = self.control_period_s
+        if not (isinstance(period, Real) and 0.0 < period < math.inf):
+            raise InvalidDomainError(f"control_period_s is {period!r}, expected seconds, above 0")
+
 
 @dataclass(frozen=True)
 class Domain(ShownInNotebooks):
@@ -104,9 +116,9 @@ class Domain(ShownInNotebooks):
 
         Raises:
             InvalidDomainError: A name occurs twice, an operator uses an unknown predicate or
-                type, or has no skill; an operator changes what is called static, or there are
-                neither operators nor static predicates; or learned actions have other axes than
-                the robot.
+                type, or has no skill; the robot has another type; an operator changes what is
+                called static, or there are neither operators nor static predicates; or learned
+                actions have other axes than the robot.
         """
         for kind, names in (
             ("type", [t.name for t in self.types]),
@@ -121,6 +133,12 @@ class Domain(ShownInNotebooks):
                 raise InvalidDomainError(
                     f"domain {self.name}: type {t} descends from {t.parent}, which is not "
                     "among the domain's types"
+                )
+        for t in self.robot_types:
+            if t not in self.types:
+                raise InvalidDomainError(
+                    f"domain {self.name}: robot_types has {t!r}, which is not among the domain's "
+                    "types"
                 )
         for operator in self.operators:
             self._check_operator(operator)
@@ -293,8 +311,19 @@ class Domain(ShownInNotebooks):
             raise InvalidDomainError(
                 f"domain {self.name}: sample_task gives {type(task).__name__}, expected a Task"
             )
+        self._require_goal(task.goal, "of sample_task")
         return task
 
     def _posed(self, task: Task, goal: str) -> Task:
         """The task with a goal that goes by a name."""
-        return replace(task, goal=self.goals[goal](task.initial_state))
+        atoms = self.goals[goal](task.initial_state)
+        self._require_goal(atoms, repr(goal))
+        return replace(task, goal=atoms)
+
+    def _require_goal(self, goal: object, origin: str) -> None:
+        """Refuse a goal that the domain's own code made of something else than atoms."""
+        if not (isinstance(goal, frozenset) and all(isinstance(a, GroundAtom) for a in goal)):
+            raise InvalidDomainError(
+                f"domain {self.name}: the goal {origin} is a {type(goal).__name__}, expected a "
+                "frozenset of ground atoms"
+            )

@@ -10,7 +10,7 @@ import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.doctor.check import Check
-from slap_ros.domain_check import acquisition, atoms, cost, markov, skills, tasks
+from slap_ros.domain_check import acquisition, atoms, cost, learner, markov, skills, tasks
 from slap_ros.domain_check.experience import Experience, gather
 
 __all__ = ["CHECK_SEED", "Experience", "check_domain", "gather"]
@@ -35,6 +35,7 @@ def check_domain(
     rng = np.random.default_rng([CHECK_SEED, seed])
     yield cost.import_time(domain)
     yield tasks.different(domain, CHECK_SEED + seed, task_count)
+    yield tasks.names(domain, CHECK_SEED + seed)
     yield atoms.shapes(domain, CHECK_SEED + seed)
     if domain.acquisition is not None:
         yield from acquisition.parts(domain, domain.acquisition)
@@ -48,8 +49,11 @@ def check_domain(
     experience = gather(domain, start, solved.episodes, state_count, rng)
     yield markov.reset(domain, experience)
     yield markov.repeat(domain, experience, rng)
+    yield atoms.unread(domain, experience)
     yield atoms.margins(domain, experience)
     yield atoms.thresholds(domain, CHECK_SEED + seed, task_count)
     yield skills.lower_bounds(solver, solved)
     yield skills.deterministic(solver, solved)
+    if domain.learning is not None:
+        yield learner.interface(domain, domain.learning.interface, experience)
     yield from cost.speed(domain, experience)

@@ -71,6 +71,57 @@ def margins(domain: Domain, experience: Experience) -> Check:
     return Check("margins", "ok", found)
 
 
+def unread(domain: Domain, experience: Experience) -> Check:
+    """Whether predicates that are evaluated only once, or not for each robot state, may be.
+
+    Args:
+        domain: Domain to check.
+        experience: Transitions; the robot of each state is put into the state before it.
+    """
+    for transition in experience.transitions:
+        before, after = map(domain.atom_space, (transition.state, transition.following))
+        if changed := before.static_truth ^ after.static_truth:
+            atom = next(iter(before.decode(changed)))
+            return Check(
+                "unread features",
+                "problem",
+                f"{atom.predicate.name} counts as static, as no operator changes it, but {atom} "
+                "changes",
+                "say in the operators' effects what changes it",
+            )
+    alike: dict[int, State] = {}  # the newest state, by its objects
+    for state in experience.states:
+        other = alike.get(id(state.layout), state)
+        alike[id(state.layout)] = state
+        if read := _read_of_robot(domain, state, other):
+            return Check(
+                "unread features",
+                "problem",
+                f"{read} changes with the robot's features alone",
+                f"add {read.predicate.name} to Domain.robot_predicates, or take the robot's type "
+                "out of robot_types: other predicates are not evaluated again when only a robot "
+                "moves",
+            )
+    return Check("unread features", "ok", "what is not evaluated again does not change")
+
+
+def _read_of_robot(domain: Domain, state: State, other: State) -> GroundAtom | None:
+    """An atom that another robot state changes, though it is said to read none; None for none.
+
+    Args:
+        domain: Domain of the atoms.
+        state: State whose atoms are compared.
+        other: State of the same objects that has the other robot state.
+    """
+    space, data = domain.atom_space(state), state.data.copy()
+    for obj, part in state.layout.slices.items():
+        if obj.type in domain.robot_types:
+            data[part] = other.data[part]
+    differs = space.truth(state) != space.truth(State(state.layout, data))
+    found = (space.atoms[i] for i in np.flatnonzero(differs))
+    return next((a for a in found if a.predicate not in domain.robot_predicates), None)
+
+
 def thresholds(domain: Domain, seed: int, count: int) -> Check:
     """Whether atoms of initial states are so close to their thresholds that rounding decides.
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 from slap_ros.core import Domain
 from slap_ros.doctor.check import Check
-from slap_ros.errors import SlapError
+from slap_ros.errors import MalformedPddlError, SlapError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import solve
 from slap_ros.planning.execution import EpisodeResult
+from slap_ros.relational.pddl import write_domain, write_problem
 
 SHOWN = 3  # reasons for failures that are told
 
@@ -49,6 +50,22 @@ def different(domain: Domain, seed: int, count: int) -> Check:
     if distinct == 1 < count:
         return Check(name, "warning", f"all {count} tasks are the same", "training needs others")
     return Check(name, "ok", f"{distinct} different tasks among {count}")
+
+
+def names(domain: Domain, seed: int) -> Check:
+    """Whether what has a name can be written as PDDL, as nodes and bags have operators.
+
+    Args:
+        domain: Domain to check.
+        seed: Seed of the task whose objects are looked at.
+    """
+    task = domain.task(seed)
+    try:
+        write_domain(domain.name, domain.types, domain.predicates, domain.operators)
+        write_problem("task", domain.name, task.initial_state.objects, (), task.goal)
+    except MalformedPddlError as error:
+        return Check("names", "problem", str(error), "give it another name")
+    return Check("names", "ok", "all of them can be written as PDDL")
 
 
 @dataclass(frozen=True)

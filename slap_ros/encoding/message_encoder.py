@@ -92,7 +92,7 @@ class MessageEncoder:
             ),
             action_names=[axis.name for axis in moved],
             action_units=[axis.unit for axis in moved],
-            control_period=domain.execution.control_period_s,
+            control_period=float(domain.execution.control_period_s),
             configuration=self.key_values(domain.configuration),
             versions=self.key_values(versions()),
         )

@@ -65,7 +65,7 @@ class SceneEncoder:
         return self._make(MARKERS, markers=markers)
 
     def _marker(self, number: int, body: VisibleBody, stamp: Any, namespace: str) -> Any:
-        colour = dict(zip("rgba", body.colour, strict=True))
+        colour = dict(zip("rgba", map(float, body.colour), strict=True))
         return self._make(
             "visualization_msgs/msg/Marker",
             header=self.encoder.header(stamp),

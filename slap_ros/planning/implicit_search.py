@@ -119,8 +119,7 @@ class ImplicitSearch:
             reached, options = ground.apply(vertex.abstract), vertex.options + 1
             to_come = self._steps_to_come(reached, options)
             if to_come is not None:
-                bound = option.skill.lower_bound(vertex.state, option.objects)
-                f = max(bound, option.skill.least_steps) + to_come - vertex.minus_g
+                f = option.least_steps(vertex.state) + to_come - vertex.minus_g
                 self._put_after(vertex, f, abstract=reached, options=options, option=option)
 
     def _roll_out(self, entry: _Entry, option: Option) -> None:

@@ -278,9 +278,7 @@ class _LazySearch:
         for edge in self._frontier.edges_from(vertex.node):
             if edge.target in before:
                 continue
-            skill = edge.option.skill
-            bound = skill.lower_bound(vertex.state, edge.option.objects)
-            self._frontier.push(vertex, edge, max(skill.least_steps, bound))
+            self._frontier.push(vertex, edge, edge.option.least_steps(vertex.state))
 
     def _evaluate(self, entry: _QueueEntry, edge: Edge) -> None:
         """Roll an edge out, or so much of it that its bound rises."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from numbers import Real
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from slap_ros.core import (
     Policy,
     Skill,
 )
-from slap_ros.errors import ErrorCode, InvalidCommandError, UnknownSkillError
+from slap_ros.errors import ErrorCode, InvalidCommandError, InvalidDomainError, UnknownSkillError
 from slap_ros.relational import AtomSpace, Object, State, Target
 
 PATIENCE = 2  # times as many steps as in the model, after which a shortcut has led elsewhere
@@ -82,6 +83,23 @@ class Option:
         if self.deletes is None:
             return Target.exactly(expected)
         return Target(expected, self.deletes & ~expected)
+
+    def least_steps(self, state: State) -> int:
+        """Environment steps that it takes at least from a state, by its skill.
+
+        Args:
+            state: State in which it would begin.
+
+        Raises:
+            InvalidDomainError: The skill answers with something that is no number.
+        """
+        bound = self.skill.lower_bound(state, self.objects)
+        if not isinstance(bound, Real):
+            raise InvalidDomainError(
+                f"skill {self.skill.name}: lower_bound gives {type(bound).__name__}, expected a "
+                "number of steps, at least 0; 1 will do"
+            )
+        return max(bound, self.skill.least_steps)
 
     def __hash__(self) -> int:
         # Skills of a task differ in their names, and options are looked up again and again.
@@ -192,6 +210,7 @@ class OptionExecution:
 
     Raises:
         SkillNotApplicableError: The skill cannot start in this state.
+        InvalidDomainError: The skill starts, but gives no policy.
     """
 
     option: Option
@@ -209,6 +228,11 @@ class OptionExecution:
 
     def __post_init__(self) -> None:
         policy = self.option.skill.start(self.state, self.option.objects)
+        if not callable(policy):
+            raise InvalidDomainError(
+                f"skill {self.option.skill.name}: start gives {type(policy).__name__}, expected a "
+                "policy: what is called with a state gives an action, or None at its end"
+            )
         self._policy = policy
         self._foreseeing = policy if isinstance(policy, ForeseeingPolicy) else None
 

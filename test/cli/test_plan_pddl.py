@@ -99,6 +99,19 @@ def test_costs_are_minimised_and_said(tmp_path: Path) -> None:
     assert "6 operators, cost 8, the least" in result.stderr
 
 
+@pytest.mark.parametrize("planner", ["anytime", "ff", "astar"])
+def test_a_cost_that_the_problem_forgets_is_said(tmp_path: Path, planner: str) -> None:
+    domain = HAULAGE.replace("(total-cost) 2", "(total-cost) (miles ?p ?q)").replace(
+        "(:functions", "(:functions (miles ?p ?q - place) - number"
+    )
+    problem = HAULAGE_TASK.replace("(motorway x z)", "")
+    result = invoke(tmp_path, (domain, problem), "plan", "--planner", planner)
+    assert result.exit_code == ErrorCode.UNSOLVABLE
+    assert result.stderr.endswith(
+        "; left out, as :init does not give what their cost is made of: drive(t, x, y) and 1 more\n"
+    )
+
+
 def test_both_definitions_in_one_file(tmp_path: Path) -> None:
     file = tmp_path / "both.pddl"
     file.write_bytes("\n".join(PAIRS["survey"]).encode("utf-8-sig"))

@@ -2,12 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """A domain whose parts do not fit is refused when it is made."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from rclpy.serialization import deserialize_message, serialize_message
+from slap_msgs.msg import DomainInfo
 
-from slap_ros.core import Acquisition
+from ensemble import encode
+from slap_ros.core import Acquisition, Execution
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidDomainError, UnknownGoalError, UnknownObjectError
 from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, State, Type, Variable
@@ -69,6 +74,23 @@ def test_what_is_said_to_be_unread_changes_no_atom(name):
     assert space.abstract_each(State(initial.layout, data)) == [
         space.abstract(State(initial.layout, row)) for row in data
     ]
+
+
+def test_robot_types_are_types_of_the_domain():
+    with pytest.raises(InvalidDomainError, match="robot_types has 'robot', which is not among"):
+        replace(DOMAIN, robot_types=frozenset({"robot"}))
+
+
+@pytest.mark.parametrize("period", [0, -0.1, math.nan, math.inf, "0.1", None])
+def test_a_control_period_is_a_number_of_seconds_above_0(period):
+    with pytest.raises(InvalidDomainError, match=f"control_period_s is {period!r}, expected"):
+        Execution(control_period_s=period)
+
+
+def test_a_control_period_may_be_a_whole_number():
+    domain = replace(DOMAIN, execution=Execution(control_period_s=1))
+    info = encode.domain_info(domain, Time())
+    assert deserialize_message(serialize_message(info), DomainInfo).control_period == 1.0
 
 
 def test_without_operators_static_predicates_are_named():

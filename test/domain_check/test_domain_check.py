@@ -14,6 +14,7 @@ from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.dynamics import Obstacle2DWorld
 from slap_ros.domains.registry import OURS
+from slap_ros.errors import InvalidDomainError
 from slap_ros.relational import Predicate, State
 from support.marks import slow
 from support.slap_command import slap
@@ -99,6 +100,72 @@ def test_a_margin_that_contradicts_its_predicate_is_found():
     assert re.match(r"On\(\w+, \w+\) (holds, .* -|does not hold, .* )\d", found.found)
 
 
+def test_a_predicate_that_reads_the_robot_though_its_type_is_said_to_be_unread_is_found():
+    empty = next(p for p in FLAT.predicates if p.name == "GripperEmpty")
+
+    def low(state, robot):
+        return empty.classifier(state, robot) & (state.stack(robot, "x") < 0.5)
+
+    domain = with_predicate("GripperEmpty", classifier=low)
+    found = findings(domain, tasks=1)["unread features"]
+    assert found.status == "problem"
+    assert found.found == "GripperEmpty(robot) changes with the robot's features alone"
+    changed = next(p for p in domain.predicates if p.name == "GripperEmpty")
+    for sound in (
+        replace(domain, robot_predicates=frozenset({changed})),
+        replace(domain, robot_types=frozenset()),
+    ):
+        assert findings(sound, tasks=1)["unread features"].status == "ok"
+
+
+def test_a_predicate_that_changes_though_no_operator_says_so_is_found():
+    on = next(p for p in FLAT.predicates if p.name == "On")
+    lifted = Predicate("Lifted", on.types[:1], lambda s, block: s.stack(block, "held") > 0.5)
+    domain = replace(FLAT, predicates=(*FLAT.predicates, lifted))
+    found = findings(domain)["unread features"]
+    assert found.status == "problem"
+    assert found.found.startswith("Lifted counts as static, as no operator changes it, but Lifted(")
+
+
+ASKED = FLAT.learning.interface
+
+
+@pytest.mark.parametrize(
+    ("answers", "found"),
+    [
+        ({"hand": lambda s: s.data}, "raises "),
+        (
+            {"robot": lambda s, h: h[0]},
+            r"robot has the shape \(\d\,\) for 8 states, wanted \(8, k\)",
+        ),
+        ({"objects": lambda s, h, c: np.ones((8, 2))}, r"objects of \w+ has the shape \(8, 2\)"),
+        (
+            {"objects": lambda *given: np.nan * ASKED.objects(*given)},
+            "objects of blocks is not finite everywhere",
+        ),
+        (
+            {"distance": lambda *given: ASKED.distance(*given)[:, 0]},
+            r"distance of blocks has the shape \(8,\) for 8 states, wanted \(8, \d\)",
+        ),
+        ({"separation": lambda *given: ASKED.separation(*given)[0]}, "separation of blocks has"),
+        ({"at_rest": lambda s: True}, r"at_rest has the shape \(\)"),
+        ({"grasping": frozenset({"Holding"})}, "grasping has Holding, which the domain does not"),
+    ],
+)
+def test_a_learners_interface_that_no_learner_could_use_is_found(answers, found):
+    changed = replace(ASKED, **answers)
+    domain = replace(FLAT, learning=replace(FLAT.learning, interface=changed))
+    check = findings(domain, tasks=1)["learner's interface"]
+    assert check.status == "problem"
+    assert re.match(found, check.found)
+
+
+def test_names_that_no_node_could_write_are_found():
+    found = findings(replace(FLAT, name="obstacle 2d"), tasks=1)["names"]
+    assert found.status == "problem"
+    assert "'obstacle 2d' cannot name a domain" in found.found
+
+
 def test_initial_states_on_a_threshold_are_found():
     clear: Predicate = next(p for p in FLAT.predicates if p.name == "Clear")
     touchy = with_predicate("Clear", margin=lambda *a: np.where(clear.margin(*a) >= 0, 0.0, -1.0))
@@ -175,6 +242,48 @@ def test_a_domain_in_which_nothing_can_be_solved_says_why_and_is_checked_all_the
     assert found["pure planning"].status == "problem"
     assert found["pure planning"].found.startswith("0 of 3 tasks solved; not so: ")
     assert found["Markov"].status == "ok"
+
+
+class Odd(TooHigh):
+    """A skill whose answers are replaced."""
+
+    def __init__(self, skill, answers):
+        super().__init__(skill)
+        self.answers = answers
+
+    def lower_bound(self, state, objects):
+        return self.answers.get("lower_bound", 1)
+
+    def start(self, state, objects):
+        return self.answers.get("start", lambda _: self.answers.get("action"))
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"lower_bound": None}, r"skill \w+: lower_bound gives NoneType, expected a number"),
+        ({"start": None}, r"skill \w+: start gives NoneType, expected a policy"),
+        ({"start": iter(())}, r"skill \w+: start gives tuple_iterator, expected a policy"),
+        ({"action": [0.0, 0.0, 1.0]}, r"a command has 3 entries .*, got list, not an array"),
+    ],
+)
+def test_what_skills_answer_is_named_where_it_will_not_do(answers, words):
+    skills = {name: Odd(skill, answers) for name, skill in FLAT.skills.items()}
+    found = findings(replace(FLAT, skills=skills))["pure planning"]
+    assert found.status == "problem"
+    assert re.search(words, found.found)
+
+
+def test_a_goal_that_is_a_list_is_named():
+    def sample(rng):
+        task = FLAT.sample_task(rng)
+        return replace(task, goal=list(task.goal))
+
+    with pytest.raises(InvalidDomainError, match="the goal of sample_task is a list, expected a f"):
+        replace(FLAT, sample_task=sample).task(0)
+    named = replace(FLAT, goals={"mine": lambda state: list(FLAT.default_goal(state))})
+    with pytest.raises(InvalidDomainError, match="the goal 'mine' is a list"):
+        named.task(0, goal="mine")
 
 
 def test_the_command_prints_what_it_found_and_answers_with_a_code():

@@ -124,8 +124,11 @@ def test_an_error_of_a_domain_ends_the_episode_with_its_name(bench, tmp_path, pa
     assert any(kind == FAULT.type_name for kind, _ in bench.heard)
 
 
-def test_what_cannot_be_shown_is_not_missed(bench):
+def test_what_cannot_be_shown_is_not_missed_and_said_once(bench, capfd):
     assert bench.solve_breaking(1, "bodies").success
+    told = capfd.readouterr().err
+    assert told.count("not shown: domain fragile raised ZeroDivisionError") == 1
+    assert told.count("Traceback") == 1
 
 
 @pytest.mark.parametrize("part", ["predicate", "static predicate"])

@@ -5,9 +5,11 @@
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from visualization_msgs.msg import Marker
+from rclpy.serialization import deserialize_message, serialize_message
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ensemble.encode import SCENE
+from slap_ros.core import VisibleBody
 from slap_ros.domains import get_domain
 from slap_ros.encoding.scene_encoder import body_poses
 from slap_ros.worlds.panda import grasp_pose
@@ -74,3 +76,13 @@ def test_joint_states_are_those_of_the_arm_and_only_of_an_arm():
     assert list(message.name) == [f"panda_joint{i}" for i in range(1, 8)]
     assert np.array_equal(message.position, tower.data[:7])
     assert SCENE.joint_state(get_domain("obstacle2d").task(0).initial_state, STAMP).name == []
+
+
+def test_a_domain_may_write_whole_numbers_and_numbers_of_numpy():
+    half = np.float32(0.5)
+    body = VisibleBody("cup", (1, half, 0), (0, 0, 0, 1), (1, 1, 1), (0, half, 1, 1))
+    sent = serialize_message(SCENE.markers([body], STAMP))
+    (marker,) = deserialize_message(sent, MarkerArray).markers
+    colour, position = marker.color, marker.pose.position
+    assert (colour.r, colour.g, colour.b, colour.a) == (0.0, 0.5, 1.0, 1.0)
+    assert (position.x, position.y, position.z) == (1.0, 0.5, 0.0)

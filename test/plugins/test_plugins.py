@@ -12,6 +12,7 @@ import pytest
 
 from slap_ros.core import Domain, DomainFactory, presets
 from slap_ros.doctor import domains as doctor
+from slap_ros.domain_check.cost import import_time
 from slap_ros.domains import domain_names, get_domain, preset_names
 from slap_ros.domains.registry import OURS
 from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError
@@ -233,6 +234,13 @@ def make():
 
 def undrawn():
     return replace(sweeping.make(), name="undrawn", sample_task=lambda rng: None)
+
+
+def worldless():
+    return replace(sweeping.make(), name="worldless", make_world=lambda: None)
+
+
+print("a banner")
 """
 
 
@@ -248,3 +256,18 @@ def test_a_mistake_in_a_domains_own_code_is_no_fault_of_ours(install):
     failed = slap("plan", "undrawn")
     assert failed.exit_code == ErrorCode.INVALID_DOMAIN
     assert "sample_task gives NoneType, expected a Task" in failed.stderr
+
+
+def test_where_slap_fails_with_what_a_domain_gave_it_the_domain_is_named(install):
+    install({"worldless": "stranger:worldless"}, stranger=FAILING)
+    failed = slap("plan", "worldless")
+    assert failed.exit_code == ErrorCode.INTERNAL_ERROR
+    # Tests before this one may have used other packages in this process.
+    words = r"a fault of slap, or of what the package (\w+ or )*stranger( or \w+)* gives it: TypeE"
+    assert re.search(words, failed.stderr)
+    Path(failed.stderr.split()[-1]).unlink()
+
+
+def test_a_domain_that_prints_when_it_is_imported_is_timed(install):
+    install({"undrawn": "stranger:undrawn"}, stranger=FAILING)
+    assert import_time(get_domain("undrawn")).status == "ok"

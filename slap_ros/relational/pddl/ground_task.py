@@ -61,6 +61,8 @@ class GroundTask:
         actions: Ground actions, in the order of the domain's operators.
         complemented: Mask of the atoms whose complement has the next bit.
         disjunctions: Disjunctions, those first that others are made of.
+        without_cost: Names of ground actions that are left out, as the problem does not give what
+            they cost.
     """
 
     size: int
@@ -69,6 +71,7 @@ class GroundTask:
     actions: tuple[GroundAction, ...]
     complemented: int = 0
     disjunctions: tuple[Disjunction, ...] = ()
+    without_cost: tuple[str, ...] = ()
 
     def apply(self, action: GroundAction, state: int) -> int:
         """The state after an action that is applicable: deletes first, then adds."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 from slap_ros.errors import MalformedPddlError, PlanningLimitError, UnsolvableError
@@ -66,10 +66,14 @@ def ground_task(
     goal = conditions.ground(problem.condition, {})
     if goal is None:
         raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")
+    without_cost: list[str] = []
     instances = [
-        instance for found in reached.instances if (instance := _ground(found, conditions, problem))
+        instance
+        for found in reached.instances
+        if (instance := _ground(found, conditions, problem, without_cost))
     ]
-    return _Assembly(conditions, goal, instances).task(reached.initial, reached.reached)
+    task = _Assembly(conditions, goal, instances).task(reached.initial, reached.reached)
+    return replace(task, without_cost=tuple(without_cost))
 
 
 # -- what can be reached --------------------------------------------------------------------------
@@ -327,14 +331,24 @@ class _GroundInstance:
 
 
 def _ground(
-    found: _ActionInstance, conditions: _Conditions, problem: PddlProblem
+    found: _ActionInstance, conditions: _Conditions, problem: PddlProblem, without_cost: list[str]
 ) -> _GroundInstance | None:
-    """The action with its conditions ground; None where it can never be applied."""
+    """The action with its conditions ground; None where it can never be applied.
+
+    Args:
+        found: Action that may be possible.
+        conditions: What grounds conditions.
+        problem: Gives the values of functions.
+        without_cost: Gets the name of the action where its cost is not given.
+    """
     precondition = conditions.ground(found.action.precondition, found.binding)
     if precondition is None:
         return None
+    names = ", ".join(found.binding[variable.name] for variable in found.action.parameters)
+    name = f"{found.action.name}({names})"
     cost = _cost(found, problem)
     if cost is None:
+        without_cost.append(name)
         return None
     effects = []
     for effect in found.effects:
@@ -342,8 +356,7 @@ def _ground(
         if condition is not None:
             added, deleted = map(conditions.numbers, (effect.added, effect.deleted))
             effects.append((condition, added, deleted))
-    names = ", ".join(found.binding[variable.name] for variable in found.action.parameters)
-    return _GroundInstance(f"{found.action.name}({names})", precondition, tuple(effects), cost)
+    return _GroundInstance(name, precondition, tuple(effects), cost)
 
 
 def _cost(found: _ActionInstance, problem: PddlProblem) -> float | None:
