@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from slap_ros.core import Domain
+from slap_ros.errors import InvalidParameterError
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
 from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
@@ -23,6 +24,17 @@ class Plant:
     """A robot and its objects. Time passes in control periods."""
 
     def __init__(self, domain: Domain, initial: State) -> None:
+        """Begin in a state.
+
+        Args:
+            domain: Domain whose world the robot is in.
+            initial: State to begin in.
+
+        Raises:
+            InvalidParameterError: The domain has no Panda.
+        """
+        if ROBOT not in domain.types:
+            raise InvalidParameterError(f"{domain.name} has no Panda, which the mock robot is")
         self._world = domain.make_world(initial)
         (self._robot,) = initial.layout.of_type(ROBOT)
         names = [feature.name for feature in VELOCITY_FEATURES]

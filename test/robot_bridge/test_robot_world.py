@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from robot_bridge.mock.plant import Plant
 from slap_ros.domains import get_domain
 from slap_ros.errors import (
     InvalidCommandError,
@@ -471,6 +472,13 @@ def test_domains_without_a_panda_and_presets_that_jump_are_refused():
     jumps = get_domain("obstacle_tower", "paper")
     with pytest.raises(InvalidParameterError, match="which a real arm must not"):
         RobotWorld(jumps, sampled_scene_config(jumps.task(0).initial_state), LIMITS)
+
+
+@pytest.mark.parametrize("name", ["obstacle2d", "peg_in_hole"])
+def test_a_mock_robot_of_a_domain_without_a_panda_is_refused(name):
+    domain = get_domain(name)
+    with pytest.raises(InvalidParameterError, match=f"{name} has no Panda, which the mock robot"):
+        Plant(domain, domain.task(0).initial_state)
 
 
 SCENE = """
