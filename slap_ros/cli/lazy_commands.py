@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import getdoc
 from typing import Any
 
 from typer import Typer
@@ -85,5 +86,10 @@ def _command(name: str, function: Any) -> Any:
     from slap_ros.cli.options import flat_options
 
     app = Typer(add_completion=False)
-    app.command(name)(exits(flat_options(function)))
+    app.command(name, help=_unwrapped(function))(exits(flat_options(function)))
     return get_command(app)
+
+
+def _unwrapped(function: Any) -> str:
+    """What a function says of itself, a line for each paragraph: the terminal wraps them."""
+    return "\n\n".join(" ".join(part.split()) for part in (getdoc(function) or "").split("\n\n"))
