@@ -531,13 +531,16 @@ def test_libraries_that_ship_together_are_those_that_were_evaluated(name):
     assert evaluated["library"]["digest"] == library.digest
 
 
-@pytest.mark.parametrize("name", ["peg_in_hole", "stow_hammer"])
-def test_the_library_that_two_skills_show_is_the_one_that_was_evaluated(name):
+@pytest.mark.parametrize(
+    ("found", "name"),
+    [("chains", "peg_in_hole"), ("chains", "stow_hammer"), ("approaches", "make_coffee")],
+)
+def test_a_library_over_skills_that_ship_is_the_one_that_was_evaluated(found, name):
     models = Path(__file__).parents[2] / "models"
     bench = open_domain(DomainChoice(name, "fair", str(models / "skills" / name)))
-    evaluated = json.loads((models / "chains" / name / "evaluation.json").read_text())
+    evaluated = json.loads((models / found / name / "evaluation.json").read_text())
     assert evaluated["skills"]["digest"] == bench.configuration["skills_digest"]
-    library = chosen_library(str(models / "chains" / name / "shortcuts"), bench)
+    library = chosen_library(str(models / found / name / "shortcuts"), bench)
     assert evaluated["library"]["digest"] == library.digest
 
 
