@@ -544,12 +544,15 @@ def test_a_library_over_skills_that_ship_is_the_one_that_was_evaluated(found, na
     assert evaluated["library"]["digest"] == library.digest
 
 
-def test_what_two_skills_show_shortens_a_plan_that_a_fresh_world_confirms():
+@pytest.mark.parametrize(
+    ("found", "name", "seed"), [("chains", "stow_hammer", 300), ("approaches", "make_coffee", 302)]
+)
+def test_what_is_cloned_shortens_a_plan_that_a_fresh_world_confirms(found, name, seed):
     models = Path(__file__).parents[2] / "models"
-    bench = open_domain(DomainChoice("stow_hammer", "fair", str(models / "skills/stow_hammer")))
-    library = chosen_library(str(models / "chains" / "stow_hammer" / "shortcuts"), bench)
+    bench = open_domain(DomainChoice(name, "fair", str(models / "skills" / name)))
+    library = chosen_library(str(models / found / name / "shortcuts"), bench)
     alone, one_sample, _ = approaches(library, DEFAULT)
-    before, after = (solve(bench, bench.task(300), each, "lazy") for each in (alone, one_sample))
+    before, after = (solve(bench, bench.task(seed), each, "lazy") for each in (alone, one_sample))
     assert before.success and after.success
     assert after.plan_length < 0.9 * before.plan_length
 
