@@ -52,7 +52,8 @@ class TrainOptions:
         typer.Option(
             help="Hyper-parameters: ours, ours_short (ends as soon as plans get no shorter), "
             "ours_several (more shortcuts, also for random goals), ours_near (explores with pushes "
-            "at objects, and beyond what operators reach), ours_chains (clones two skills in a "
+            "at objects, and beyond what operators reach), ours_approaches (clones a push after a "
+            "way round an object), ours_chains (clones two skills in a "
             "row, made shorter), ours_kept_chains (the same of skills and shortcuts of --keep), "
             "subgoals (one policy for several shortcuts), paper (the paper's), or the name of the "
             "domain's own."

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The contract between domains and everything that plans, learns, executes or shows."""
 
-from slap_ros.core.acquisition import Acquisition, Approach, Primitives, Script
+from slap_ros.core.acquisition import Acquisition, Approach, Primitives, Script, SideApproach, Sides
 from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
 from slap_ros.core.display import Animate, Display, PictureSize, VisibleBody
 from slap_ros.core.domain import Domain, Execution, Goal
@@ -36,6 +36,8 @@ __all__ = [
     "Primitives",
     "Script",
     "SettingValue",
+    "SideApproach",
+    "Sides",
     "Skill",
     "SyncVectorWorld",
     "Task",

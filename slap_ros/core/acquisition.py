@@ -50,6 +50,31 @@ class Primitives:
 
 
 @dataclass(frozen=True)
+class SideApproach:
+    """A way of going near an object, from one side.
+
+    Args:
+        policy: Policy that brings the hand to 0.04 m before the object; None once it is there, or
+            gives up.
+        onwards: Robot's action that moves the hand on towards the object at full speed, shape
+            (axes,).
+    """
+
+    policy: Policy
+    onwards: Array
+
+
+# (state, object) to ways of going near it, from each side that the hand can be at.
+Sides = Callable[[State, Object], tuple[SideApproach, ...]]
+
+
+def no_sides(state: State, obj: Object) -> tuple[SideApproach, ...]:
+    """No way of going near an object is known."""
+    del state, obj
+    return ()
+
+
+@dataclass(frozen=True)
 class Acquisition:
     """What skills are acquired with, where none are given.
 
@@ -60,6 +85,7 @@ class Acquisition:
         scripts: Scripts of the demonstrator, by operator name.
         horizon: Environment steps of a skill, approach not counted.
         primitives: Movements with parameters, for learners that choose from these; None for none.
+        sides: Ways of going near an object, for those who look for shortcuts.
     """
 
     approach: Approach
@@ -68,3 +94,4 @@ class Acquisition:
     scripts: Mapping[str, Script] = field(default_factory=dict)
     horizon: int = 50
     primitives: Primitives | None = None
+    sides: Sides = no_sides

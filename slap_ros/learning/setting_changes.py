@@ -35,6 +35,7 @@ ZERO_TOO = frozenset(
         "refinements",
         "shortcuts",
         "straightened",
+        "approaches",
         "disturbed",
     }
 )

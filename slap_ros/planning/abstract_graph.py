@@ -323,7 +323,7 @@ class _Beyond:
         self._nodes, self._depth = list(graph.nodes), list(graph.depth)
         self._index = {abstract: i for i, abstract in enumerate(graph.nodes)}
         self._found: list[tuple[EdgeBeyond, int]] = []  # edges, each with the node it leads to
-        self._goals_again: dict[int, int] = {}  # by abstract states, which the graph has as well
+        self._again: dict[int, int] = {}  # by abstract states, which the graph has as well
 
     def add(self, beyond: Sequence[EdgeBeyond]) -> None:
         """Layer by layer, as the graph was built; then what leads to no goal is dropped."""
@@ -351,9 +351,10 @@ class _Beyond:
             return None
         index = self._index
         target = index.get(edge.abstract)
-        if target is not None and target < self._old <= edge.source and self._is_goal(target):
-            # Forward edges lead to later nodes. So a goal is a node once more, after all of them.
-            index = self._goals_again
+        if target is not None and self._leads_on(target, edge.source, depth):
+            # Forward edges lead to later nodes. So where the way beyond comes back to the graph, as
+            # at goals, a node is there once more, after all of them.
+            index = self._again
             target = index.get(edge.abstract)
         new = target is None
         if target is None:
@@ -365,6 +366,11 @@ class _Beyond:
         if target >= self._old and target > edge.source:
             self._found.append((edge, target))
         return target if new else None
+
+    def _leads_on(self, target: int, source: int, depth: int) -> bool:
+        """Whether a way beyond comes back to a node from which it can still end in a goal."""
+        rejoins = target < self._old <= source
+        return rejoins and (self._is_goal(target) or depth <= self._depth[target])
 
     def _add_useful(self) -> None:
         """Add the nodes from which a goal can be reached, and the edges to them."""

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Demonstrations of a shortcut: the skills that it replaces, executed and made shorter.
 
-Nobody writes or records them. Skills lead from the shortcut's start to its target, and
-:mod:`slap_ros.shortcuts.straightening` makes their execution shorter.
+Nobody writes or records them. Skills lead from the shortcut's start to its target, or an approach
+of an object and a push at it, and :mod:`slap_ros.shortcuts.straightening` makes their execution
+shorter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, permutations, product
 from typing import Any, NamedTuple
@@ -19,17 +20,19 @@ from numpy.typing import NDArray
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
 from slap_ros.relational.state import Array
+from slap_ros.shortcuts.approaches import Approacher
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.observation_encoder import (
     ObservationEncoder,
     ObservationLayout,
     observation_layout,
 )
-from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.starts import StartRecord, restore_starts, shortest_paths
+from slap_ros.shortcuts.signature import Signature, concerned
+from slap_ros.shortcuts.starts import Start, StartRecord, restore_starts, shortest_paths
 from slap_ros.shortcuts.straightening import (
     ChainExecutor,
     StraightenedExecution,
@@ -47,7 +50,8 @@ class ShortcutDemonstration:
     Args:
         start: Start of the shortcut in which it begins.
         actions: Actions of the policy, from -1 to 1, one tuple per step.
-        replaced: Environment steps of the skills before their execution was made shorter.
+        replaced: Environment steps of the skills, or of approach and push, before their execution
+            was made shorter.
         environment_steps: Environment steps that it took to find.
     """
 
@@ -137,8 +141,9 @@ def demonstrate(
     tries: int,
     rng: np.random.Generator,
     kept: KeptShortcuts = NOTHING_KEPT,
+    push: int = 0,
 ) -> ShortcutDemonstration | None:
-    """Execute the skills from a start to its target, and make the execution shorter.
+    """Execute what leads from a start to its target, and make the execution shorter.
 
     Args:
         domain: Domain with the skills.
@@ -147,29 +152,60 @@ def demonstrate(
         tries: Number of stretches that are tried.
         rng: Generator that draws the stretches.
         kept: Shortcuts that are skills like any other.
+        push: Environment steps of pushes, where approaches with pushes lead there; 0 where skills
+            do.
 
     Returns:
-        The demonstration; None where skills do not lead to the target, or with actions that the
+        The demonstration; None where they do not lead to the target, or with actions that the
         shortcut has not.
     """
     (start,) = restore_starts(domain, [record])
-    problem = Problem.of(domain, start.state)
-    try:
-        planner = kept.planner(domain, problem, start.state)
-        graph = graph_of(planner, start.space.abstract(start.state), start.target)
-    except SlapError:  # no operators lead there
-        return None
-    executor = ChainExecutor(domain, problem.model.space, start.state)
     encoder = ObservationEncoder(domain, start.space, signature, start.change)
     straightener = Straightener(domain, encoder, start.state)
-    for way in _ways(graph):
-        commands = executor.commands(start.state, way, graph.nodes)
-        found = None if commands is None else straightener.shorten(commands, tries, rng)
-        if commands is not None and found is not None:
+    model: Approacher | ChainExecutor
+    if push:
+        model = Approacher(domain, domain.model_world(start.state))
+        pushes = model.pushes(start.state, concerned(start.change, start.space), push, rng)
+        shown = _reaching(pushes, encoder, straightener)
+    else:
+        problem = Problem.of(domain, start.state)
+        model = ChainExecutor(domain, problem.model.space, start.state)
+        shown = _executed(model, kept.planner(domain, problem, start.state), start)
+    for commands in shown:
+        found = straightener.shorten(commands, tries, rng)
+        if found is not None:
             actions = tuple(tuple(row) for row in found.actions.tolist())
-            steps = executor.steps + straightener.steps
+            steps = model.steps + straightener.steps
             return ShortcutDemonstration(record, actions, len(commands), steps)
     return None
+
+
+def _executed(executor: ChainExecutor, planner: GraphPlanner, start: Start) -> Iterator[Array]:
+    """Yield the robot's actions, shape (steps, axes), in ways that lead to the start's target."""
+    try:
+        graph = graph_of(planner, start.space.abstract(start.state), start.target)
+    except SlapError:  # no operators lead there
+        return
+    for way in _ways(graph):
+        commands = executor.commands(start.state, way, graph.nodes)
+        if commands is not None:
+            yield commands
+
+
+def _reaching(
+    pushes: Iterable[Array], encoder: ObservationEncoder, straightener: Straightener
+) -> Iterator[Array]:
+    """Yield the actions that reach the target, up to there.
+
+    Args:
+        pushes: Robot's actions, shape (steps, axes) each.
+        encoder: Encoder for the change that the shortcut makes.
+        straightener: Straightener at the start of the shortcut.
+    """
+    for commands in pushes:
+        execution = straightener.execute(encoder.action_map.inverse(commands))
+        if execution is not None:
+            yield commands[: execution.steps]
 
 
 def _ways(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:

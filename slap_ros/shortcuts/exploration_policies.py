@@ -82,10 +82,11 @@ class StraightPushes:
 
     Args:
         directions: Action of each world, which is the same in every step, shape (worlds, axes).
+        name: Name in the records of what they found.
     """
 
     directions: Array
-    name = PUSH
+    name: str = PUSH
 
     def actions(self, step: int) -> Array:
         """See :class:`ExplorationPolicy`."""
@@ -140,15 +141,16 @@ class PushAim:
         for gradient in gradients.T:
             steepest = float(np.abs(gradient).max())
             if steepest > 0.0:
-                yield StraightPushes(self._to_action(self._tilted(-gradient / steepest)))
+                yield self.along(-gradient / steepest)
 
-    def _tilted(self, direction: Array) -> Array:
-        """A direction and others near it, along one axis at full speed each, shape (worlds, k)."""
-        noise = TILT * self._rng.standard_normal((self._count, len(direction)))
-        noise[0] = 0.0
-        tilted = direction + noise
-        fastest: Array = np.abs(tilted).max(axis=-1, keepdims=True)
-        return tilted / fastest
+    def along(self, direction: Array, name: str = PUSH) -> StraightPushes:
+        """Pushes in a direction and others near it.
+
+        Args:
+            direction: Action of a policy, shape (k,).
+            name: Name in the records of what they found.
+        """
+        return StraightPushes(self._to_action(tilted(direction, self._count, self._rng)), name)
 
     def _gradients(self, state: State, objects: list[Object]) -> Array:
         """How distances grow with each axis, shape (axes, objects)."""
@@ -176,3 +178,21 @@ class PushAim:
         hand = self._interface.hand(reached)
         columns = [self._interface.distance(reached, hand, Column((obj,))) for obj in objects]
         return np.concatenate(columns, axis=-1)
+
+
+def tilted(direction: Array, count: int, rng: np.random.Generator) -> Array:
+    """A direction and others near it, along one axis at full speed each.
+
+    Args:
+        direction: Action of a policy, shape (k,); the first one is as it is.
+        count: Number of directions.
+        rng: Generator that draws how much they are tilted.
+
+    Returns:
+        Shape (count, k).
+    """
+    noise = TILT * rng.standard_normal((count, len(direction)))
+    noise[0] = 0.0
+    directions = direction + noise
+    fastest: Array = np.abs(directions).max(axis=-1, keepdims=True)
+    return directions / fastest

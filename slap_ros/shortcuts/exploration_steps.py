@@ -9,6 +9,7 @@ from math import ceil
 from slap_ros.core import Domain
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import State
+from slap_ros.shortcuts.approaches import MOST_STEPS, sides_of
 from slap_ros.shortcuts.exploration_policies import PROBE_STEPS, within_reach
 from slap_ros.shortcuts.settings import ExplorationSettings
 
@@ -46,12 +47,30 @@ def most_rollout_steps(domain: Domain, settings: ExplorationSettings, state: Sta
     return batches * worlds * settings.length + aiming
 
 
+def most_approach_steps(domain: Domain, settings: ExplorationSettings, state: State) -> int:
+    """Count the environment steps of all approaches from a state, and of what follows them.
+
+    Args:
+        domain: Domain of the state.
+        settings: Settings of exploration.
+        state: State in which the approaches begin.
+
+    Returns:
+        Environment steps where every approach takes as many as it may.
+    """
+    if not settings.approaches:
+        return 0
+    pushes = settings.approaches * exploration_worlds(domain, settings) * settings.length
+    reach = within_reach(domain, state)
+    return sum(len(sides_of(domain, state, obj)) for obj in reach) * (MOST_STEPS + pushes)
+
+
 def usual_steps(domain: Domain, settings: ExplorationSettings, skill_steps: int) -> int:
     """Estimate how many environment steps exploration takes.
 
     Those of the rollouts are counted, which are most of them. Exploration may take fewer, where
-    rollouts fail early or where what is held changes inside a skill, and more: skills are executed,
-    too, to reach states and to see what it takes on from them.
+    rollouts fail early, approaches do not arrive, or what is held changes inside a skill, and more:
+    skills are executed, too, to reach states and to see what it takes on from them.
 
     Args:
         domain: Domain that is explored.
@@ -64,5 +83,7 @@ def usual_steps(domain: Domain, settings: ExplorationSettings, skill_steps: int)
     sources = settings.nodes
     if settings.inside:  # each node but the first is reached by a skill
         sources += (settings.nodes - 1) * ((skill_steps - 1) // settings.inside)
-    each = most_rollout_steps(domain, settings, domain.task(0).initial_state)
-    return settings.tasks * sources * each
+    state = domain.task(0).initial_state
+    each = most_rollout_steps(domain, settings, state)
+    near = most_approach_steps(domain, settings, state)
+    return settings.tasks * (sources * each + settings.nodes * near)

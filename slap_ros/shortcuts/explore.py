@@ -28,11 +28,13 @@ from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import Vertex
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
+from slap_ros.shortcuts.approaches import APPROACHED, Approacher
 from slap_ros.shortcuts.exploration_policies import (
     RANDOM,
     ExplorationPolicy,
     PushAim,
     RandomExploration,
+    within_reach,
 )
 from slap_ros.shortcuts.exploration_steps import exploration_worlds, most_rollout_steps
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
@@ -233,6 +235,7 @@ class Explorer:
         self._retracer = OptionRetracer(
             domain.model_world(task.initial_state), self.space, domain.action_space
         )
+        self._approacher = Approacher(domain, domain.model_world(task.initial_state))
         self._indexed: tuple[Vertex, Mapping[int, int]] | None = None  # of the latest vertex
         self._way_on = WayOn(problem, self.graph.goal)
         self._steps = 0
@@ -358,7 +361,8 @@ class Explorer:
     @property
     def _taken(self) -> int:
         """Environment steps so far."""
-        return self._steps + self._aim.steps + self._retracer.steps + self._way_on.steps
+        others = self._aim, self._retracer, self._approacher, self._way_on
+        return self._steps + sum(other.steps for other in others)
 
     @property
     def _left(self) -> float:
@@ -375,13 +379,15 @@ class Explorer:
         )
 
     def _origins(self, vertices: Sequence[Vertex]) -> Iterator[RolloutOrigin]:
-        """Yield where rollouts begin: in vertices, and inside the options that led there.
+        """Yield where rollouts begin: in vertices, near objects, and inside options that led there.
 
         A shortcut from inside an option begins where the option does. So what is held must be what
         was held there.
         """
         for vertex in vertices:
             yield RolloutOrigin(vertex, vertex.state)
+            if self._settings.approaches:
+                yield from self._approached(vertex)
             if self._settings.inside and vertex.edge is not None and vertex.parent is not None:
                 if vertex.g - vertex.parent.g > self._left:
                     return
@@ -391,6 +397,17 @@ class Explorer:
                     before = self.space.abstract(origin.vertex.state)
                     if not (before ^ self.space.abstract(origin.state)) & self._grasping:
                         yield origin
+
+    def _approached(self, vertex: Vertex) -> Iterator[RolloutOrigin]:
+        """Yield where approaches lead from a vertex, as far as the budget goes."""
+        if not self._accepts(vertex.state):
+            return
+        for obj in within_reach(self._domain, vertex.state):
+            if self._approacher.most_steps(vertex.state, obj) > self._left:
+                return
+            for there in list(self._approacher.approach(vertex.state, obj)):
+                steps = len(there.commands)
+                yield RolloutOrigin(vertex, there.state, steps, there.onwards)
 
     def _destination(
         self,
@@ -545,20 +562,24 @@ class Explorer:
     def _roll_out(self, origin: RolloutOrigin) -> dict[int, _Reached]:
         """Rollouts, for all targets at once: those that reached each abstract state, a mask."""
         reached: dict[int, _Reached] = {}
-        for policy in self._policies(origin.state):
+        for policy in self._policies(origin):
             for first in self._roll_out_batch(origin.state, policy):
                 for abstract, (steps, state) in first.items():
                     reached.setdefault(abstract, _Reached(state, steps)).add(steps, state, policy)
         return reached
 
-    def _policies(self, state: State) -> Iterator[ExplorationPolicy]:
-        """Yield a policy for each batch of rollouts from a state."""
+    def _policies(self, origin: RolloutOrigin) -> Iterator[ExplorationPolicy]:
+        """Yield a policy for each batch of rollouts from an origin."""
         settings = self._settings
+        if origin.onwards is not None:
+            for _ in range(settings.approaches):
+                yield self._aim.along(origin.onwards, APPROACHED)
+            return
         for _ in range(0, settings.rollouts, self._count):
             for repeat in filter(None, (settings.action_repeat, settings.also_repeat)):
                 yield RandomExploration(self._domain, self._count, repeat, self._rng)
         for _ in range(settings.pushes):
-            yield from self._aim.pushes(state)
+            yield from self._aim.pushes(origin.state)
 
     def _roll_out_batch(
         self, state: State, policy: ExplorationPolicy

@@ -120,8 +120,8 @@ class RolloutFollower:
     they move. As long as the robot itself is where it should be, the rollout is still the best
     guess: it ends where the next option can begin, which the policy alone does not promise.
 
-    Where the hand loses what it holds, and the shortcut has no gripper to take it again, the
-    shortcut is over.
+    Where the hand loses what it holds, which it does not in the rollout, and the shortcut has no
+    gripper to take it again, the shortcut is over.
     """
 
     def __init__(self, skill: GroundShortcut, rollout: ShortcutRollout, grasp: int) -> None:
@@ -143,7 +143,8 @@ class RolloutFollower:
     def __call__(self, state: State) -> Action | None:
         """The next action; None where the shortcut cannot succeed any more."""
         self.foreseen = None
-        if self._skill.encoder.kept_grasp(state) != self._grasp:
+        held = self._skill.encoder.kept_grasp(state)
+        if held != self._grasp and held != self._predicted_grasp():
             return None
         if self._step < len(self._predicted):
             predicted, action, after = self._predicted[self._step]
@@ -154,6 +155,12 @@ class RolloutFollower:
         self._predicted = ()
         observations = self._skill.encoder.encode(state.alone()).observations
         return self._skill.command(self._skill.shortcut.policy.mean(observations)[0])
+
+    def _predicted_grasp(self) -> int:
+        """What is held by now in the rollout: what is pressed down is not, for a moment."""
+        if self._step < len(self._predicted):
+            return self._skill.encoder.kept_grasp(self._predicted[self._step][0])
+        return self._grasp
 
     def _is_as_predicted(self, state: State, predicted: State) -> bool:
         off = np.abs(state.data - predicted.data)

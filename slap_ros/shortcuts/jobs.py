@@ -152,6 +152,7 @@ def demonstration(
     signature: Signature,
     tries: int,
     kept: KeptShortcuts = NOTHING_KEPT,
+    push: int = 0,
 ) -> dict[str, Any] | None:
     """A demonstration of a shortcut; see :func:`~slap_ros.shortcuts.demonstrations.demonstrate`.
 
@@ -161,13 +162,14 @@ def demonstration(
         signature: Signature of the shortcut.
         tries: Number of stretches that are tried to make the skills' execution shorter.
         kept: Shortcuts that are skills like any other.
+        push: Environment steps of pushes that follow approaches; 0 where skills show the shortcut.
 
     Returns:
         A :class:`~slap_ros.shortcuts.demonstrations.ShortcutDemonstration` as JSON; None where
-        skills do not show the shortcut.
+        nothing shows the shortcut.
     """
     rng = np.random.default_rng([distribution.seed, STARTS.first, start.index])
-    found = demonstrate(distribution.make_domain(), start, signature, tries, rng, kept)
+    found = demonstrate(distribution.make_domain(), start, signature, tries, rng, kept, push)
     return None if found is None else found.as_json()
 
 

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from slap_ros.core import ActionSpace, World
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.planning.options import OptionExecution, OptionResult
 from slap_ros.planning.search import Vertex
 from slap_ros.relational import AtomSpace, State, Target
+from slap_ros.relational.state import Array
 
 
 @dataclass(frozen=True)
@@ -22,11 +23,14 @@ class RolloutOrigin:
         vertex: Vertex at the state, or before it on the way.
         state: State in which rollouts begin.
         steps: Environment steps from the vertex to the state.
+        onwards: Policy's action that moves the hand on towards what an approach has brought it
+            near; None where there was no approach.
     """
 
     vertex: Vertex
     state: State
     steps: int = 0
+    onwards: Array | None = field(default=None, compare=False)
 
     @property
     def g(self) -> int:

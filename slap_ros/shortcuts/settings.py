@@ -29,6 +29,7 @@ OTHER_WAYS = (
     "straightened",
     "regrasps",
     "along_plan",
+    "approaches",
 )  # settings of exploration that work folders lack where they are off
 
 
@@ -59,6 +60,8 @@ class ExplorationSettings:
         regrasps: Whether two skills also show what leaves the hand as it was, though they take or
             release something on the way. Its policy has the gripper then.
         along_plan: Whether the first of two skills may also begin wherever the plan leads.
+        approaches: Number of batches of straight pushes from where each approach of an object ends
+            (:mod:`slap_ros.shortcuts.approaches`); 0 for no approaches.
     """
 
     tasks: int = 4
@@ -75,6 +78,7 @@ class ExplorationSettings:
     straightened: int = 0
     regrasps: bool = False
     along_plan: bool = False
+    approaches: int = 0
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
@@ -282,6 +286,18 @@ _CHAINS: Mapping[str, SettingValue] = {
     "starts": 200,
     "horizon": 60,
 }
+APPROACHES = "ours_approaches"  # settings that clone approaches with pushes, made shorter
+_APPROACHES: Mapping[str, SettingValue] = {
+    "exploration.rollouts": 1,
+    "exploration.length": 25,
+    "exploration.approaches": 1,
+    "exploration.beyond": True,
+    "cloning.straightened": 30,  # what was cut more closely fails more often
+    "cloning.disturbed": 4,
+    "cloning.epochs": 40,
+    "starts": 200,
+    "horizon": 60,
+}
 KEPT_CHAINS = "ours_kept_chains"  # the same of skills and of shortcuts that a training keeps
 _KEPT_CHAINS: Mapping[str, SettingValue] = {
     **_CHAINS,
@@ -305,6 +321,7 @@ _ABSTRACT_HER: Mapping[str, SettingValue] = {
 _VARIANTS = {
     SEVERAL: _SEVERAL,
     SHORT: _SHORT,
+    APPROACHES: _APPROACHES,
     NEAR: _NEAR,
     CHAINS: _CHAINS,
     KEPT_CHAINS: _KEPT_CHAINS,

@@ -23,6 +23,7 @@ from slap_ros.learning.task_range import TaskRange
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts.approaches import APPROACHED
 from slap_ros.shortcuts.demonstrations import ShortcutDemonstration
 from slap_ros.shortcuts.exploration_policies import RANDOM
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
@@ -305,8 +306,8 @@ class Training:
         starts = self._starts(group, operator_steps)
         if not starts:  # it can begin in no task
             return length
-        shown = self._demonstrations(group.signature, starts)
-        if self.settings.cloning is not None and not shown:  # skills do not show it
+        shown = self._demonstrations(group, starts)
+        if self.settings.cloning is not None and not shown:  # nothing shows it
             return length
         learned = with_demonstrations(self._learn(group.signature, starts, shown), shown)
         self._spent += int(learned.record.get("environment_steps", 0))
@@ -419,19 +420,20 @@ class Training:
         )
 
     def _demonstrations(
-        self, signature: Signature, starts: tuple[StartRecord, ...]
+        self, group: CandidateGroup, starts: tuple[StartRecord, ...]
     ) -> tuple[ShortcutDemonstration, ...]:
         """Demonstrations of a shortcut, for cloning."""
-        cloning = self.settings.cloning
+        cloning, exploration = self.settings.cloning, self.settings.exploration
         if cloning is None:
             return ()
+        push = exploration.length if APPROACHED in group.found_by else 0
+        tries = cloning.straightened
         work = [
-            (self.distribution, start, signature, cloning.straightened, self._kept)
-            for start in starts
+            (self.distribution, start, group.signature, tries, self._kept, push) for start in starts
         ]
         return cached_jobs(
             self._work,
-            f"{signature.name}/demonstrations",
+            f"{group.signature.name}/demonstrations",
             lambda finished: self._run("straightening skills", jobs.demonstration, work, finished),
             lambda data: tuple(
                 ShortcutDemonstration.from_json(one) for one in data if one is not None

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.errors import InvalidStateError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
@@ -53,8 +53,8 @@ class WayOn:
             budget: Environment steps that may be taken; no skill is begun that could take more.
 
         Returns:
-            Environment steps; infinite where there is no way, a skill on it fails, or it could
-            take more than the budget.
+            Environment steps; infinite where there is no way, a skill on it fails or cannot begin,
+            or it could take more than the budget.
         """
         graph = self._graph(node)
         if graph is None:
@@ -67,7 +67,10 @@ class WayOn:
             if edge is None or total + edge.option.skill.step_limit > budget:
                 return NO_WAY
             target = edge.option.target(graph.nodes[edge.target])
-            rollout = self._problem.model.roll_out(edge.option, state, target)
+            try:
+                rollout = self._problem.model.roll_out(edge.option, state, target)
+            except InvalidStateError:  # pushed into one another so far that nothing can begin there
+                return NO_WAY
             self.steps += rollout.steps
             if not rollout.reached:
                 return NO_WAY

@@ -531,22 +531,28 @@ def test_libraries_that_ship_together_are_those_that_were_evaluated(name):
     assert evaluated["library"]["digest"] == library.digest
 
 
-@pytest.mark.parametrize("name", ["peg_in_hole", "stow_hammer"])
-def test_the_library_that_two_skills_show_is_the_one_that_was_evaluated(name):
+@pytest.mark.parametrize(
+    ("found", "name"),
+    [("chains", "peg_in_hole"), ("chains", "stow_hammer"), ("approaches", "make_coffee")],
+)
+def test_a_library_over_skills_that_ship_is_the_one_that_was_evaluated(found, name):
     models = Path(__file__).parents[2] / "models"
     bench = open_domain(DomainChoice(name, "fair", str(models / "skills" / name)))
-    evaluated = json.loads((models / "chains" / name / "evaluation.json").read_text())
+    evaluated = json.loads((models / found / name / "evaluation.json").read_text())
     assert evaluated["skills"]["digest"] == bench.configuration["skills_digest"]
-    library = chosen_library(str(models / "chains" / name / "shortcuts"), bench)
+    library = chosen_library(str(models / found / name / "shortcuts"), bench)
     assert evaluated["library"]["digest"] == library.digest
 
 
-def test_what_two_skills_show_shortens_a_plan_that_a_fresh_world_confirms():
+@pytest.mark.parametrize(
+    ("found", "name", "seed"), [("chains", "stow_hammer", 300), ("approaches", "make_coffee", 302)]
+)
+def test_what_is_cloned_shortens_a_plan_that_a_fresh_world_confirms(found, name, seed):
     models = Path(__file__).parents[2] / "models"
-    bench = open_domain(DomainChoice("stow_hammer", "fair", str(models / "skills/stow_hammer")))
-    library = chosen_library(str(models / "chains" / "stow_hammer" / "shortcuts"), bench)
+    bench = open_domain(DomainChoice(name, "fair", str(models / "skills" / name)))
+    library = chosen_library(str(models / found / name / "shortcuts"), bench)
     alone, one_sample, _ = approaches(library, DEFAULT)
-    before, after = (solve(bench, bench.task(300), each, "lazy") for each in (alone, one_sample))
+    before, after = (solve(bench, bench.task(seed), each, "lazy") for each in (alone, one_sample))
     assert before.success and after.success
     assert after.plan_length < 0.9 * before.plan_length
 

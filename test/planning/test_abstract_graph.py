@@ -141,6 +141,17 @@ def test_a_goal_that_is_there_already_is_a_node_once_more():
     }
 
 
+def test_what_comes_back_to_the_graph_leads_on_from_there():
+    """What is done beyond may be something that operators do later, in another order."""
+    back = [*COUNTING, operator("from6", [6], [2], [6])]
+    nodes, depth, edges = counted((0, bits(6), "leap"), operators=back)
+    assert nodes == [bits(6), bits(2), bits(3)]
+    assert depth == [1, 2, 3]
+    assert edges == [(0, 4, "leap"), (4, 5, "from6"), (5, 6, "to3")]
+    # By more edges than the operators' own, it is of no use.
+    assert counted((1, bits(6), "leap"), operators=back)[0] == []
+
+
 def test_no_path_beyond_has_more_edges_than_the_graph_is_deep():
     back = [*COUNTING, operator("from6", [6], [3, 9], [6])]
     assert counted((1, bits(6), "leap"), operators=back)[0] == [bits(6), bits(3, 9)]

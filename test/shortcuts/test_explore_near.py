@@ -168,6 +168,10 @@ def test_the_way_on_is_executed_and_there_is_none_where_operators_lead_nowhere(b
     cube = state.layout.object("cube2")
     elsewhere = state.replace({(cube, "x"): 1.1, (cube, "z"): 0.02})
     assert way.measure(elsewhere, start, steps) == NO_WAY
+    # Nor where two cubes are inside one another, as after a push that was too strong.
+    other = state.layout.object("cube0")
+    inside = state.replace({(cube, axis): float(state.get(other, axis)) for axis in "xyz"})
+    assert way.measure(inside, start, steps) == NO_WAY
 
 
 @pytest.mark.parametrize(("steps", "taken"), [(5.0, "known"), (9.0, "rare")])

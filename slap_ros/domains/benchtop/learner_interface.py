@@ -95,7 +95,7 @@ def _object_features(state: State, hand: Array, column: Column) -> Array:
     if kind.is_a(ROBOT):
         return np.zeros((*state.data.shape[:-1], len(column.objects), 0))
     parts = [
-        np.arcsinh((_grips(state, column) - hand[..., None, :]) / FINE),
+        np.arcsinh((grips(state, column) - hand[..., None, :]) / FINE),
         state.gather(column, QUATERNION),
     ]
     if kind.is_a(THING):
@@ -109,7 +109,7 @@ def _object_features(state: State, hand: Array, column: Column) -> Array:
     return np.concatenate(parts, axis=-1)
 
 
-def _grips(state: State, column: Column) -> Array:
+def grips(state: State, column: Column) -> Array:
     """Where the hand acts on objects, m, shape (..., objects, 3): on a drawer, at its handle."""
     drawer = column.objects[0].type.is_a(CABINET)
     return in_drawers(state, column, HANDLE) if drawer else positions(state, column)

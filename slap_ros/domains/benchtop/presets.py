@@ -23,6 +23,7 @@ from slap_ros.core import (
 from slap_ros.domains.benchtop.learner_interface import learner_interface
 from slap_ros.domains.benchtop.metrics import COMMON
 from slap_ros.domains.benchtop.primitives import PRIMITIVES
+from slap_ros.domains.benchtop.sides import make_sides
 from slap_ros.domains.benchtop.visualization import VIEW, display
 from slap_ros.relational import Layout, Metric, Predicate, State, Type
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
@@ -134,7 +135,7 @@ def benchtop_domain(
             interface=learner_interface(model.holding, scene_of),
             settings={"ours_near": NEAR_SETTINGS, "ours_chains": model.chains},
         ),
-        acquisition=replace(model.acquisition, primitives=PRIMITIVES),
+        acquisition=replace(model.acquisition, primitives=PRIMITIVES, sides=make_sides(scene_of)),
         configuration=settings.as_configuration(),
     )
 
