@@ -72,6 +72,8 @@ class PublishedFigure:
             return f"{trained} training{'s' if trained != 1 else ''}{tasks}"
         if "starts" in data:
             return f"{data['starts']} starts"
+        if "trials" in data:
+            return f"{data['trials']} trials each"
         if "plans" in data:
             few = f" of {PLANS}" if data["plans"] < PLANS else ""
             return f"{data['plans']}{few} plans"

@@ -25,6 +25,7 @@ import numpy as np
 
 from slap_ros.domains.cleanup_table.features import WALL, CleanupObjectIndex
 from slap_ros.domains.tabletop import observation
+from slap_ros.domains.tabletop.footprints import OrderedSums
 from slap_ros.domains.tabletop.state_access import JOINT_NAMES
 from slap_ros.relational import State
 from slap_ros.relational.predicates import Bools, cache_latest
@@ -95,16 +96,15 @@ def _to_up() -> Array:
     return to.reshape(16, 3)
 
 
-TO_UP = _to_up()
-SUM = np.ones(3)
+UP = OrderedSums.of(_to_up())
 
 
 def _extents(blocks: Array) -> tuple[Array, Array]:
     """Heights of the lowest and highest points of the boxes around blocks, shape (..., blocks)."""
     q = blocks[..., 3:7]
-    up = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16) @ TO_UP
-    middle = blocks[..., 2] + (up * blocks[..., 14:17]) @ SUM
-    half_height = (np.abs(up) * blocks[..., 11:14]) @ SUM
+    up = UP((q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16))
+    middle = blocks[..., 2] + np.add.reduce(up * blocks[..., 14:17], axis=-1)
+    half_height = np.add.reduce(np.abs(up) * blocks[..., 11:14], axis=-1)
     return middle - half_height, middle + half_height
 
 
@@ -122,7 +122,8 @@ def _on(blocks: Array, surfaces: Array, bottom: Array, held: Bools) -> Array:
 
     gap = bottom[..., :, None] - z - half_z
     inside = half_z - np.abs(blocks[..., 2, None] - z)
-    slow = SPEED_SCALE_S * (SLOW - np.sqrt(np.square(blocks[..., 7:10]) @ SUM))[..., None]
+    speed = np.sqrt(np.add.reduce(np.square(blocks[..., 7:10]), axis=-1))
+    slow = SPEED_SCALE_S * (SLOW - speed)[..., None]
     on = _all_of(
         np.stack(
             [

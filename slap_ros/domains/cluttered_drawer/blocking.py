@@ -31,13 +31,13 @@ import numpy as np
 from slap_ros.domains.classifiers import strictly
 from slap_ros.domains.cluttered_drawer.features import DrawerObjectIndex
 from slap_ros.domains.tabletop.footprints import (
-    TO_EDGES,
     Complex,
     along_axes,
     complex_of,
     half_widths,
     inverse_yaws,
     steepened,
+    unit_edges,
 )
 from slap_ros.domains.tabletop.observation import grasp_points
 from slap_ros.relational import State
@@ -123,8 +123,7 @@ class Blocks(NamedTuple):
 
 def _blocks(index: DrawerObjectIndex, data: Array) -> Blocks:
     q = data.take(index.quaternions, axis=-1)
-    products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
-    edges = products @ TO_EDGES * data.take(index.halves, axis=-1)
+    edges = unit_edges(q) * data.take(index.halves, axis=-1)
     height = np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     places = complex_of(data.take(index.places, axis=-1))[..., 0]
     z = data.take(index.z, axis=-1)

@@ -26,7 +26,6 @@ import numpy as np
 from slap_ros.domains.classifiers import strictly
 from slap_ros.domains.obstacle_tower.features import TowerObjectIndex
 from slap_ros.domains.tabletop.footprints import (
-    TO_EDGES,
     Complex,
     along_axes,
     complex_of,
@@ -34,6 +33,7 @@ from slap_ros.domains.tabletop.footprints import (
     inverse_yaws,
     steepened,
     turned,
+    unit_edges,
 )
 from slap_ros.domains.tabletop.scalar_box import ScalarBox
 from slap_ros.relational import State
@@ -77,8 +77,7 @@ def margins(objects: TowerObjectIndex, data: Array) -> tuple[Array, Array]:
     """
     blocks = slice(objects.blocks)
     q = data.take(objects.quaternions, axis=-1)
-    products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
-    edges = products @ TO_EDGES * data.take(objects.halves, axis=-1)
+    edges = unit_edges(q) * data.take(objects.halves, axis=-1)
 
     z, height = data.take(objects.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     gap = (z - height)[..., blocks, None] - (z + height)[..., None, :]

@@ -7,6 +7,9 @@ Horizontal vectors are complex numbers: turned by a product, seen along both axe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Self
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,8 +39,49 @@ def _to_edges() -> Array:
     return to.reshape(16, 9)
 
 
+@dataclass(frozen=True)
+class OrderedSums:
+    """A linear map with few terms a sum, added up one after the other.
+
+    A product of matrices adds up in the order of the processor's own library, or rounds once for
+    two operations, so that last bits differ from one processor to another.
+
+    Args:
+        terms: Which of the inputs each sum has, shape (most terms, outputs).
+        factors: What these are multiplied by, 0 where a sum has fewer terms, of the same shape.
+    """
+
+    terms: Indices
+    factors: Array
+
+    @classmethod
+    def of(cls, matrix: Array) -> Self:
+        """The map of a matrix, shape (inputs, outputs)."""
+        most = int(np.count_nonzero(matrix, axis=0).max())
+        terms = np.argsort(matrix == 0.0, axis=0, kind="stable")[:most]
+        return cls(terms, np.take_along_axis(matrix, terms, axis=0))
+
+    def __call__(self, inputs: Array) -> Array:
+        """The sums, shape (..., outputs), of inputs of shape (..., inputs)."""
+        sums: Array = np.add.reduce(inputs.take(self.terms, axis=-1) * self.factors, axis=-2)
+        return sums
+
+
 TO_EDGES = _to_edges()
+_EDGES = OrderedSums.of(TO_EDGES)
 HALVES = (*("half_x",) * 2, *("half_y",) * 2, *("half_z",) * 2, "half_x", "half_y", "half_z")
+
+
+def unit_edges(q: Array) -> Array:
+    """Where the edges of unit cubes point, as ``TO_EDGES`` orders them.
+
+    Args:
+        q: Parts of their quaternions, shape (..., cubes, 4), as ``PARTS`` orders them.
+
+    Returns:
+        Shape (..., cubes, 9).
+    """
+    return _EDGES((q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16))
 
 
 def complex_of(pairs: Array) -> Complex:
