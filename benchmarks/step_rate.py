@@ -104,8 +104,9 @@ def cluttered_drawer() -> dict[str, Any]:
     from benchmarks.physics_step import EPISODES, Episode, Plain, steps_per_second, with_joints
     from slap_ros.domains.cluttered_drawer.scene import scene_of
     from slap_ros.domains.tabletop.grasps import from_above
-    from slap_ros.domains.tabletop.state_access import joints_of, pose_of
+    from slap_ros.domains.tabletop.state_access import joints_of
     from slap_ros.motion import nearest_configurations
+    from slap_ros.worlds.features import pose_of
 
     domain = get_domain("cluttered_drawer", "paper")
     initial = domain.task(0).initial_state

@@ -156,5 +156,5 @@ def margin_of(atom: GroundAtom, state: State) -> float | None:
     """An atom's margin in a single state; None where its predicate has none."""
     if atom.predicate.margin is None:
         return None
-    columns = [Column((obj,)) for obj in atom.objects]
+    columns = [Column.of(obj) for obj in atom.objects]
     return float(np.asarray(atom.predicate.margin(state, *columns))[..., 0])

@@ -107,7 +107,7 @@ class Metric:
 
     def of(self, state: State, *objects: Object) -> float:
         """Its value in a single state, in its unit, by the vectorised definition."""
-        return float(self.value(state, *(Column((obj,)) for obj in objects))[..., 0])
+        return float(self.value(state, *(Column.of(obj) for obj in objects))[..., 0])
 
     @cached_property
     def definition(self) -> str:

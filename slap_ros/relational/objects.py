@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,16 @@ class Column:
 
     objects: tuple[Object, ...]
     _cache: IndexCache = field(default=(None, {}), init=False, repr=False)
+
+    @staticmethod
+    @lru_cache(maxsize=256)  # so that its indices are kept, too
+    def of(obj: Object) -> Column:
+        """A column of one object.
+
+        Args:
+            obj: The object.
+        """
+        return Column((obj,))
 
     def cached_indices(self, layout: object) -> dict[Any, NDArray[np.intp]]:
         """A layout's cache for this column; kept with the column, as layouts outlive episodes.

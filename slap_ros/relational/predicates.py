@@ -169,7 +169,7 @@ class GroundAtom:
 
     def holds(self, state: State) -> bool:
         """Whether it holds in a single state."""
-        columns = [Column((obj,)) for obj in self.objects]
+        columns = [Column.of(obj) for obj in self.objects]
         return bool(self.predicate.classifier(state, *columns).all())
 
     def __str__(self) -> str:

@@ -28,7 +28,7 @@ class RewardTerm:
             state: A single state.
             objects: Object of each of the operator's parameters.
         """
-        columns = [Column((objects[variable],)) for variable in self.arguments]
+        columns = [Column.of(objects[variable]) for variable in self.arguments]
         return float(self.metric.normalised(state, *columns)[0])
 
     def __str__(self) -> str:

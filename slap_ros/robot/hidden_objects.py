@@ -19,7 +19,7 @@ from slap_ros.core import ActionSpace, World
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Object, State
-from slap_ros.worlds.features import POSE_FEATURES, VELOCITY_FEATURES
+from slap_ros.worlds.features import VELOCITY_FEATURES, pose_of
 from slap_ros.worlds.joint_space.scene import Body
 
 LONGEST = 40  # steps after which what still moves is taken to be where it is
@@ -64,8 +64,8 @@ class PredictedMotion:
         """Where an object was pushed to; None for one that stays, or that the hand is to have."""
         if self.after.get(obj, "held") > 0.5:
             return None
-        pose = _pose(self.after, obj)
-        return None if pose == _pose(self.before, obj) else pose
+        pose = pose_of(self.after, obj)
+        return None if pose == pose_of(self.before, obj) else pose
 
 
 def pushed_aside(
@@ -82,11 +82,11 @@ def pushed_aside(
         The poses of those that are not where the state has them: level with that, away from what
         is seen. Where there is no room within a few centimetres, there is none here.
     """
-    placed = [body.at(_pose(state, obj)) for obj, body in bodies.items() if obj not in hidden]
+    placed = [body.at(pose_of(state, obj)) for obj, body in bodies.items() if obj not in hidden]
     moved: dict[Object, Pose] = {}
     for obj, body in bodies.items():
         if obj in hidden:
-            start = _pose(state, obj)
+            start = pose_of(state, obj)
             pose = _aside(start, body, placed) or start
             placed.append(body.at(pose))
             moved |= {obj: pose} if pose != start else {}
@@ -116,8 +116,3 @@ def _moves(state: State) -> bool:
         if names[0] in obj.type.column
         for name in names
     )
-
-
-def _pose(state: State, obj: Object) -> Pose:
-    x, y, z, qx, qy, qz, qw = (float(state.get(obj, f.name)) for f in POSE_FEATURES)
-    return Pose((x, y, z), (qx, qy, qz, qw))

@@ -12,7 +12,7 @@ from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.relational import Feature, Object, State
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.tracking import PoseEstimate
-from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
+from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES, pose_of
 from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Surroundings
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.raising import Configuration, off_fixed_bodies
@@ -129,8 +129,7 @@ class StateAssembler:
             return otherwise
         if obj in known:
             return known[obj].pose
-        x, y, z, qx, qy, qz, qw = feature_values(self._template, obj, POSE_FEATURES)
-        return Pose((x, y, z), (qx, qy, qz, qw))
+        return pose_of(self._template, obj)
 
 
 def possible_joints(measured: Sequence[float]) -> list[float]:

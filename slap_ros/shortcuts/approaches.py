@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,16 +56,20 @@ def sides_of(domain: Domain, state: State, obj: Object) -> tuple[SideApproach, .
 class Approacher:
     """Executes approaches in the model."""
 
-    def __init__(self, domain: Domain, world: World) -> None:
-        """Take a world that nobody else uses.
+    def __init__(self, domain: Domain, start: State) -> None:
+        """Nothing is executed yet, and no world made: few trainings approach anything.
 
         Args:
-            domain: Domain of the world.
-            world: World in which approaches are executed.
+            domain: Domain of the model.
+            start: State that the model's world begins in.
         """
-        self._domain, self._world = domain, world
+        self._domain, self._start = domain, start
         self._to_action = ActionMap(domain, gripper=False)
         self.steps = 0  # environment steps so far
+
+    @cached_property
+    def _world(self) -> World:
+        return self._domain.model_world(self._start)
 
     def most_steps(self, state: State, obj: Object) -> int:
         """Environment steps that all approaches of an object take at most.

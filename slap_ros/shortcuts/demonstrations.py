@@ -164,7 +164,7 @@ def demonstrate(
     straightener = Straightener(domain, encoder, start.state)
     model: Approacher | ChainExecutor
     if push:
-        model = Approacher(domain, domain.model_world(start.state))
+        model = Approacher(domain, start.state)
         pushes = model.pushes(start.state, concerned(start.change, start.space), push, rng)
         shown = _reaching(pushes, encoder, straightener)
     else:

@@ -104,7 +104,7 @@ def within_reach(domain: Domain, state: State) -> list[Object]:
     interface, batch = learner_interface(domain), state.alone()
     hand = interface.hand(batch)
     distances = {
-        obj: interface.distance(batch, hand, Column((obj,)))[0, 0] for obj in state.layout.objects
+        obj: interface.distance(batch, hand, Column.of(obj))[0, 0] for obj in state.layout.objects
     }
     return [obj for obj, distance in distances.items() if np.isfinite(distance)]
 
@@ -176,7 +176,7 @@ class PushAim:
         self.steps += PROBE_STEPS * len(probes)
         reached = State(states.layout, states.data[: len(probes)])
         hand = self._interface.hand(reached)
-        columns = [self._interface.distance(reached, hand, Column((obj,))) for obj in objects]
+        columns = [self._interface.distance(reached, hand, Column.of(obj)) for obj in objects]
         return np.concatenate(columns, axis=-1)
 
 

@@ -235,7 +235,7 @@ class Explorer:
         self._retracer = OptionRetracer(
             domain.model_world(task.initial_state), self.space, domain.action_space
         )
-        self._approacher = Approacher(domain, domain.model_world(task.initial_state))
+        self._approacher = Approacher(domain, task.initial_state)
         self._indexed: tuple[Vertex, Mapping[int, int]] | None = None  # of the latest vertex
         self._way_on = WayOn(problem, self.graph.goal)
         self._steps = 0

@@ -90,7 +90,7 @@ def observation_layout(
     hand = interface.hand(batch)
     widths = {
         # whether there is one, its deficit, and its own features
-        name: 2 + interface.objects(batch, hand, Column((examples[name],))).shape[-1]
+        name: 2 + interface.objects(batch, hand, Column.of(examples[name])).shape[-1]
         for name in signature.slots
     }
     return ObservationLayout(interface.robot(batch, hand).shape[-1], signature.slots, widths)

@@ -7,13 +7,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector
-from slap_ros.relational import Feature
+from slap_ros.relational import Column, Feature, Object, State
 from slap_ros.worlds.panda import JOINTS
 
 POSE_FEATURES = (
     *(Feature(axis, "m") for axis in ("x", "y", "z")),
     *(Feature(f"q{axis}", "1") for axis in ("x", "y", "z", "w")),
 )
+POSE_NAMES = tuple(feature.name for feature in POSE_FEATURES)
 VELOCITY_FEATURES = (
     *(Feature(f"v{axis}", "m/s") for axis in ("x", "y", "z")),
     *(Feature(f"w{axis}", "rad/s") for axis in ("x", "y", "z")),
@@ -23,10 +24,21 @@ BODY_FEATURES = (*POSE_FEATURES, *VELOCITY_FEATURES, Feature("held", "1"))
 JOINT_FEATURES = tuple(Feature(f"joint{i + 1}", "rad") for i in range(JOINTS))
 
 
+def pose_of(state: State, obj: Object) -> Pose:
+    """Where an object is, in the base's frame.
+
+    Args:
+        state: A single state.
+        obj: Object of the state, with :data:`POSE_FEATURES`.
+    """
+    x, y, z, qx, qy, qz, qw = state.gather(Column.of(obj), POSE_NAMES)[0].tolist()
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
 def pose_features(pose: Pose) -> Mapping[str, float]:
-    """A fixed body's features, for ``State.build``."""
+    """A body's pose as features, for ``State.build`` or ``State.replace``."""
     values = (*pose.position, *pose.quaternion)
-    return dict(zip((f.name for f in POSE_FEATURES), values, strict=True))
+    return dict(zip(POSE_NAMES, values, strict=True))
 
 
 def body_features(

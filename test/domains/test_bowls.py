@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.benchtop.state_access import pose_of, position_of
+from slap_ros.domains.benchtop.state_access import position_of
 from slap_ros.domains.bowls.model import SPOTS
 from slap_ros.domains.bowls.scenery import FURNITURE, OUTSIDE, REST_HEIGHT
 from slap_ros.domains.bowls.tasks import bowl_station, fixed_station
 from slap_ros.errors import InvalidParameterError, UnknownObjectError
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.worlds.features import pose_of
 from support.skill_starts import CONSTANT, achieves, skill_starts
 
 DOMAIN = get_domain("bowls")

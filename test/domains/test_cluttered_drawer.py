@@ -20,7 +20,7 @@ from slap_ros.domains.cluttered_drawer.tasks import (
     RandomDrawerTasks,
 )
 from slap_ros.domains.tabletop.grasps import from_above
-from slap_ros.domains.tabletop.state_access import joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.errors import InvalidParameterError, InvalidStateError, SkillNotApplicableError
 from slap_ros.evaluation import experiment
 from slap_ros.evaluation.approaches import PURE_PLANNING
@@ -34,6 +34,7 @@ from slap_ros.planning.options import given_option
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Column, State, Target
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import MAX_STEP, grasp_pose
 from support.states import changed, fluent_atoms

@@ -23,7 +23,7 @@ from slap_ros.domains.obstacle_tower.tasks import (
 )
 from slap_ros.domains.tabletop.grasps import grasps_along_faces
 from slap_ros.domains.tabletop.placements import GAP
-from slap_ros.domains.tabletop.state_access import joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.transit import CLEARANCE
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.motion import nearest_configurations, shifted
@@ -35,6 +35,7 @@ from slap_ros.relational import Column
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.signature import concerned, kinds
 from slap_ros.shortcuts.signature_grounder import SignatureGrounder
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.scene import CUBE_MATERIAL
 from support.marks import slow

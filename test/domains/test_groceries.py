@@ -9,7 +9,7 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.room import within_reach
-from slap_ros.domains.benchtop.state_access import pose_of, yaw_of
+from slap_ros.domains.benchtop.state_access import yaw_of
 from slap_ros.domains.groceries.model import NAMES, REWARDS
 from slap_ros.domains.groceries.scenery import GROCERIES, INNER, OUTER, WALL_HEIGHT
 from slap_ros.domains.groceries.tasks import basket_station, grasp_goal, station
@@ -18,6 +18,7 @@ from slap_ros.relational import Column
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.panda import FINGER_OPEN
 from support.skill_starts import CONSTANT, achieves, skill_starts
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from slap_ros.domains.tabletop.grasps import grasps_along_faces
-from slap_ros.domains.tabletop.state_access import JOINT_NAMES, joints_of, pose_of, robot_of
+from slap_ros.domains.tabletop.state_access import JOINT_NAMES, joints_of, robot_of
 from slap_ros.motion.inverse_kinematics import inverse_kinematics
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.worlds.features import pose_of
 
 pytest.importorskip("pybullet")
 

@@ -15,12 +15,7 @@ from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
 from slap_ros.domains.benchtop.hand_motion import OPEN, HandGoal
 from slap_ros.domains.benchtop.scripts import Move, follow, over
-from slap_ros.domains.benchtop.state_access import (
-    hand_position,
-    hand_target,
-    pose_of,
-    position_of,
-)
+from slap_ros.domains.benchtop.state_access import hand_position, hand_target, position_of
 from slap_ros.domains.make_coffee.scenery import (
     BOTTOM,
     HOLDER_RADIUS,
@@ -35,6 +30,7 @@ from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.worlds.contact.world import MAX_SHIFT
+from slap_ros.worlds.features import pose_of
 from support.drawer_states import (
     assert_margins_agree,
     assert_metrics_agree,

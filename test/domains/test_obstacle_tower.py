@@ -16,7 +16,7 @@ from slap_ros.domains.obstacle_tower.tasks import (
     RandomTowerTasks,
     TowerArrangement,
 )
-from slap_ros.domains.tabletop.state_access import joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
 from slap_ros.evaluation import experiment
 from slap_ros.evaluation.approaches import PURE_PLANNING
@@ -29,7 +29,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import State
 from slap_ros.worlds.bodies import Material
-from slap_ros.worlds.features import POSE_FEATURES
+from slap_ros.worlds.features import POSE_FEATURES, pose_of
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 from slap_ros.worlds.panda import MAX_STEP, hand_pose

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.benchtop.state_access import POSE_NAMES, pose_of
 from slap_ros.domains.peg_in_hole.demonstrator import acts_at, outwards
 from slap_ros.domains.peg_in_hole.model import HOLE, IN, IS_CLEAR, PEG
 from slap_ros.geometry.pose import IDENTITY, Pose, from_rotation_vector, from_yaw
 from slap_ros.relational import Column, State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.worlds.features import POSE_NAMES, pose_of
 from support.skill_starts import CONSTANT, achieves, skill_starts
 from support.states import fluent_atoms, initial_states_at_rest
 

@@ -12,13 +12,13 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
-from slap_ros.domains.benchtop.state_access import pose_of
 from slap_ros.domains.stow_hammer.scenery import HALF_LENGTH, RADIUS, SHAPE
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.worlds.features import pose_of
 from support.drawer_states import (
     assert_margins_agree,
     assert_metrics_agree,

@@ -8,9 +8,10 @@ from benchmarks.physics_step import with_joints
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower.skills import PLANNING_SCENE
 from slap_ros.domains.tabletop.grasps import from_above
-from slap_ros.domains.tabletop.state_access import joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.transit import CLEARANCE, LOWER, Transit
 from slap_ros.motion import nearest_configurations
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 from slap_ros.worlds.panda import grasp_pose
 

@@ -93,7 +93,7 @@ def test_an_approach_ends_before_the_object_on_each_side_where_there_is_room():
     domain = get_domain("stack_at_target")
     state = domain.task(SEED).initial_state
     cube = state.layout.object("cube0")
-    approacher = Approacher(domain, domain.make_world(state))
+    approacher = Approacher(domain, state)
     ended = list(approacher.approach(state, cube))
     assert 3 <= len(ended) <= len(sides_of(domain, state, cube)) == 5
     middle = np.array([state.get(cube, axis) for axis in "xyz"])

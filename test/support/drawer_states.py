@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from slap_ros.core import Domain, Policy, World
-from slap_ros.domains.benchtop.state_access import POSE_NAMES
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Column, Object, State
+from slap_ros.worlds.features import POSE_NAMES
 from support.skill_starts import CONSTANT, achieves
 
 

@@ -23,7 +23,6 @@ from slap_ros.domains.benchtop.state_access import (
     hand_position,
     hand_positions,
     in_base,
-    pose_of,
     position_of,
     positions,
     value,
@@ -41,6 +40,7 @@ from slap_ros.relational import (
     Variable,
 )
 from slap_ros.relational.state import Array
+from slap_ros.worlds.features import pose_of
 
 # -- where its parts are --------------------------------------------------------------------------
 

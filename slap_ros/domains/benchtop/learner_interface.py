@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 
@@ -137,7 +136,7 @@ def _distances(state: State, hand: Array, column: Column) -> Array:
 
 def _separations(state: State, obj: Object, column: Column) -> Array:
     """Between origins; a robot's is its grasp point."""
-    between = state.gather(column, POSITION) - state.gather(_alone(obj), POSITION)
+    between = state.gather(column, POSITION) - state.gather(Column.of(obj), POSITION)
     distances: Array = np.linalg.norm(between, axis=-1)
     return distances
 
@@ -169,8 +168,3 @@ def _can_go_up(state: State, scene_of: Callable[[State], ContactScene]) -> bool:
     scene = scene_of(state)
     index = ContactIndex.of(scene, state.layout)
     return way_up_is_free(scene, index.read(state), index.placement(scene, state))
-
-
-@lru_cache(maxsize=256)
-def _alone(obj: Object) -> Column:
-    return Column((obj,))

@@ -22,13 +22,13 @@ from slap_ros.domains.benchtop.state_access import (
     axis_of,
     hand_position,
     hand_positions,
-    pose_of,
     position_of,
     positions,
 )
 from slap_ros.relational import Column, Metric, NormalisedForm, Object, State, Type
 from slap_ros.relational.metrics import TRUTH
 from slap_ros.relational.state import Array
+from slap_ros.worlds.features import pose_of
 
 REST_SPEED = 0.05  # m/s: slower is at rest
 REST_SPIN = 0.5  # rad/s

@@ -24,7 +24,6 @@ from slap_ros.domains.benchtop.state_access import (
     hand_position,
     hand_target,
     held_thing,
-    pose_of,
     value,
     yaw_of,
 )
@@ -32,6 +31,7 @@ from slap_ros.geometry.pose import Vector, conjugate, rotate
 from slap_ros.relational import Column, Object, State
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT
+from slap_ros.worlds.features import pose_of
 
 TURNS = tuple(k * 0.5 * math.pi for k in range(4))  # rad, from an object's x axis to its sides
 
@@ -65,7 +65,7 @@ def make_sides(scene_of: Callable[[State], ContactScene]) -> Sides:
 
 
 def _side(state: State, obj: Object, outwards: Vector, away: float) -> SideApproach:
-    point = grips(state.alone(), Column((obj,)))[0, 0]
+    point = grips(state.alone(), Column.of(obj))[0, 0]
     x, y, z = (point + away * np.array(outwards)).tolist()
     _, yaw = hand_target(state)
     goal = HandGoal((x, y, max(z, _lowest(state))), yaw)

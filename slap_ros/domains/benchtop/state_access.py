@@ -18,14 +18,13 @@ from slap_ros.relational import Column, Layout, Object, State
 from slap_ros.relational.state import Array
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.hand import wrapped
-from slap_ros.worlds.features import POSE_FEATURES
+from slap_ros.worlds.features import pose_of
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
 LINEAR = ("vx", "vy", "vz")
 ANGULAR = ("wx", "wy", "wz")
 TARGET = ("target_x", "target_y", "target_z")
-POSE_NAMES = tuple(feature.name for feature in POSE_FEATURES)
 
 
 # -- single states --------------------------------------------------------------------------------
@@ -52,12 +51,6 @@ def position_of(state: State, obj: Object) -> Vector:
     """Where an object's origin is, m."""
     x, y, z = (float(state.get(obj, axis)) for axis in POSITION)
     return (x, y, z)
-
-
-def pose_of(state: State, obj: Object) -> Pose:
-    """Where an object is, in the base's frame."""
-    x, y, z, qx, qy, qz, qw = (float(state.get(obj, name)) for name in POSE_NAMES)
-    return Pose((x, y, z), (qx, qy, qz, qw))
 
 
 def axis_of(state: State, obj: Object) -> Vector:

@@ -21,10 +21,11 @@ from slap_ros.domains.benchtop.scripts import (
     release,
     travel_height,
 )
-from slap_ros.domains.benchtop.state_access import pose_of, standing_on
+from slap_ros.domains.benchtop.state_access import standing_on
 from slap_ros.domains.bowls.scenery import GRIP
 from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.relational import Object, State
+from slap_ros.worlds.features import pose_of
 
 LIFT = 0.06  # m, from where a bowl was grasped
 

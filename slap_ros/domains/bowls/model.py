@@ -24,7 +24,6 @@ from slap_ros.domains.benchtop.state_access import (
     axes,
     hand_position,
     hand_positions,
-    pose_of,
     position_of,
     positions,
     value,
@@ -42,6 +41,7 @@ from slap_ros.relational import (
 )
 from slap_ros.relational.metrics import at_least, is_true, within
 from slap_ros.relational.state import Array
+from slap_ros.worlds.features import pose_of
 
 HALVES = ("half_length", "half_width")  # along x and y
 SIZES = tuple(Feature(name, "m") for name in HALVES)

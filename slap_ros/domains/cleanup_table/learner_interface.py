@@ -15,7 +15,6 @@ from slap_ros.domains.cleanup_table.features import BLOCK, HALF, CleanupObjectIn
 from slap_ros.domains.cleanup_table.predicates import GRIPPER_EMPTY, HOLDING, NOT_HOLDING
 from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.observation import Features, joined
-from slap_ros.domains.tabletop.state_access import single
 from slap_ros.relational import Column, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
@@ -50,7 +49,7 @@ def _bin(state: State) -> Column:
     surfaces = CleanupObjectIndex.of(state.layout).surfaces
     first = state.data.reshape(-1, state.data.shape[-1])[0]
     labels = first[state.layout.grid(surfaces, ("is_drawer",))[:, 0]]
-    return single(surfaces.objects[int(np.argmax(labels))])
+    return Column.of(surfaces.objects[int(np.argmax(labels))])
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:

@@ -25,7 +25,13 @@ import numpy as np
 
 from slap_ros.domains.cleanup_table.features import WALL, CleanupObjectIndex
 from slap_ros.domains.tabletop import observation
-from slap_ros.domains.tabletop.footprints import OrderedSums
+from slap_ros.domains.tabletop.footprints import (
+    OrderedSums,
+    along_axes,
+    complex_of,
+    products_of_parts,
+    turned,
+)
 from slap_ros.domains.tabletop.state_access import JOINT_NAMES
 from slap_ros.relational import State
 from slap_ros.relational.predicates import Bools, cache_latest
@@ -102,7 +108,7 @@ UP = OrderedSums.of(_to_up())
 def _extents(blocks: Array) -> tuple[Array, Array]:
     """Heights of the lowest and highest points of the boxes around blocks, shape (..., blocks)."""
     q = blocks[..., 3:7]
-    up = UP((q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16))
+    up = UP(products_of_parts(q))
     middle = blocks[..., 2] + np.add.reduce(up * blocks[..., 14:17], axis=-1)
     half_height = np.add.reduce(np.abs(up) * blocks[..., 11:14], axis=-1)
     return middle - half_height, middle + half_height
@@ -115,10 +121,11 @@ def _on(blocks: Array, surfaces: Array, bottom: Array, held: Bools) -> Array:
     walls = np.where(is_drawer, WALL, 0.0)[..., None]
 
     # Sideways, vectors are complex numbers: turned by a product.
-    pairs = np.ascontiguousarray(surfaces[..., None, :, :4]).view(np.complex128)
-    place = np.ascontiguousarray(blocks[..., :2]).view(np.complex128)
-    offset = (place - pairs[..., 0]) * np.square(pairs[..., 1].conj())
-    sideways = surfaces[..., None, :, 5:7] - walls - np.abs(offset[..., None].view(np.float64))
+    pairs = complex_of(np.ascontiguousarray(surfaces[..., None, :, :4]))
+    place = complex_of(np.ascontiguousarray(blocks[..., :2]))
+    half_turn = pairs[..., 1].conj()  # back, by the yaw
+    offset = turned(place - pairs[..., 0], turned(half_turn, half_turn))
+    sideways = surfaces[..., None, :, 5:7] - walls - along_axes(offset)
 
     gap = bottom[..., :, None] - z - half_z
     inside = half_z - np.abs(blocks[..., 2, None] - z)

@@ -8,12 +8,13 @@ from collections.abc import Iterable, Mapping
 
 from slap_ros.domains.cleanup_table.features import BLOCK, HALF, MIDDLE, SURFACE, WALL
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
-from slap_ros.domains.tabletop.state_access import box_of, pose_of
+from slap_ros.domains.tabletop.state_access import box_of
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import Solid
 from slap_ros.relational import Object, State
 from slap_ros.worlds.bodies import WOOD, Colour, Material
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.joint_space.scene import REFERENCE_FRICTION, Box, Mesh, Scene
 
 TABLE_TOP = 0.0

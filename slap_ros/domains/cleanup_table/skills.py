@@ -28,13 +28,7 @@ from slap_ros.domains.tabletop.skills import (
     Trajectory,
     TrajectoryFollower,
 )
-from slap_ros.domains.tabletop.state_access import (
-    JOINT_NAMES,
-    box_of,
-    grasp_of,
-    joints_of,
-    pose_of,
-)
+from slap_ros.domains.tabletop.state_access import JOINT_NAMES, box_of, grasp_of, joints_of
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.transit import CLEARANCE, PLANS, SEED
 from slap_ros.errors import SkillNotApplicableError
@@ -52,6 +46,7 @@ from slap_ros.motion import (
 )
 from slap_ros.relational import Object, State
 from slap_ros.relational.predicates import Bools
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.gripper import GRASP_REACH
 from slap_ros.worlds.panda import FINGER_OPEN, JOINTS, grasp_pose

@@ -37,6 +37,7 @@ from slap_ros.domains.tabletop.footprints import (
     half_widths,
     inverse_yaws,
     steepened,
+    turned,
     unit_edges,
 )
 from slap_ros.domains.tabletop.observation import grasp_points
@@ -109,6 +110,13 @@ class ClearanceBoxes(NamedTuple):
         spans = np.stack([halves, halves[:, ::-1]], axis=-1)
         return ClearanceBoxes(depth, halves[:, None, None], spans[:, None])
 
+    def spans_after(self, turn: Complex) -> Array:
+        """Half their spans after turns, shape (..., sides, blocks, targets, 2)."""
+        # Added up by hand: a product of matrices has other last bits on another processor.
+        cos, sin = np.split(along_axes(turn), 2, axis=-1)
+        spans: Array = cos * self.spans[..., :1, :] + sin * self.spans[..., 1:, :]
+        return spans
+
 
 class Blocks(NamedTuple):
     """The blocks of a state. Horizontal vectors are complex numbers: turned by a product."""
@@ -171,19 +179,18 @@ def _overlap(boxes: ClearanceBoxes, index: DrawerObjectIndex, blocks: Blocks) ->
     # Along the target's faces: from the middles of the clearances to those of the blocks.
     half_spans = target_widths.take(AXES, axis=-1).swapaxes(-1, -2) + boxes.depth
     middles = half_spans * TOWARDS[:, None]
-    offset = (places[..., None] - places.take(rows, axis=-1)[..., None, :]) * target_back[
-        ..., None, :
-    ]
+    apart = places[..., None] - places.take(rows, axis=-1)[..., None, :]
+    offset = turned(apart, target_back[..., None, :])
     offset = offset[..., None, :, :] - middles[..., None, :]
     block_widths = half_widths(flat[..., :, None, :], target_back[..., None, :])[..., None, :, :, :]
     gaps = along_axes(offset) - block_widths - boxes.halves
 
     # Along the faces of the block itself.
-    turn = (back[..., None] * target_back[..., None, :].conj())[..., None, :, :]
-    own_gaps = along_axes(offset * turn) - along_axes(turn) @ boxes.spans
+    turn = turned(back[..., None], target_back[..., None, :].conj())[..., None, :, :]
+    own_gaps = along_axes(turned(offset, turn)) - boxes.spans_after(turn)
     own_gaps -= half_widths(flat, back)[..., None, :, None, :]
-    apart = np.maximum(gaps, own_gaps)
-    return -np.maximum(apart[..., 0], apart[..., 1])
+    separation = np.maximum(gaps, own_gaps)
+    return -np.maximum(separation[..., 0], separation[..., 1])
 
 
 def _towards_base(back: Complex) -> Complex:

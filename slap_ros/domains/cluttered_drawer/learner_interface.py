@@ -17,7 +17,6 @@ from slap_ros.domains.cluttered_drawer.predicates import GRASPING
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM
 from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.observation import Features, joined
-from slap_ros.domains.tabletop.state_access import single
 from slap_ros.relational import Column, GroundAtom, State
 from slap_ros.relational.state import Array
 
@@ -67,7 +66,7 @@ def _distance_to_middle(state: State, hand: Array, column: Column) -> Array:
 
 
 def _target(state: State) -> Column:
-    return single(state.layout.of_type(TARGET)[0])
+    return Column.of(state.layout.of_type(TARGET)[0])
 
 
 def _success_tolerance(atom: GroundAtom) -> float:

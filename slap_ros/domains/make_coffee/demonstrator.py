@@ -22,7 +22,6 @@ from slap_ros.domains.benchtop.scripts import GENTLE, Move, follow, grasp, over,
 from slap_ros.domains.benchtop.state_access import (
     axis_of,
     hand_position,
-    pose_of,
     position_of,
     standing_on,
     value,
@@ -31,6 +30,7 @@ from slap_ros.domains.benchtop.state_access import (
 from slap_ros.domains.make_coffee.scenery import HINGE, HOLDER, POD, lid_pose
 from slap_ros.geometry.pose import Vector
 from slap_ros.relational import Object, State
+from slap_ros.worlds.features import pose_of
 
 TRAVEL_HEIGHT = 0.23  # of the grasp point, which then passes over an open lid
 LIFT = 0.1  # of a pod that was picked

@@ -42,13 +42,13 @@ from slap_ros.domains.benchtop.state_access import (
     hand_position,
     hand_positions,
     in_base,
-    pose_of,
     value,
 )
 from slap_ros.domains.make_coffee.scenery import HINGE, HOLDER, LID_LENGTH, POD, lid_pose
 from slap_ros.relational import Column, Metric, Object, Predicate, State, Variable
 from slap_ros.relational.metrics import at_least, at_most, within
 from slap_ros.relational.state import Array
+from slap_ros.worlds.features import pose_of
 
 TYPES = (PLACE, THING, DRAWER, LID, POD, CABINET, HOLDER)
 INSERTED = 0.006  # between the axes of pod and holder, whose walls leave 4 mm to each side
@@ -88,7 +88,7 @@ DIS_TO_LID = Metric(
 
 def tilt(state: State, pod: Object) -> float:
     """The angle between a pod's axis and the vertical."""
-    return float(_tilt(state, Column((pod,)))[0])
+    return float(_tilt(state, Column.of(pod))[0])
 
 
 def _tilt(state: State, pods: Column) -> Array:

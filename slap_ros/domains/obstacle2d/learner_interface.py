@@ -69,8 +69,8 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
 
 def _separation(state: State, thing: Object, column: Column) -> Array:
     """Between middles; fixed places lie on the table, at y = 0."""
-    aside = np.abs(state.stack(column, "x") - state.stack(Column((thing,)), "x"))
-    height = 0.0 if thing.type.is_a(SURFACE) else state.stack(Column((thing,)), "y")
+    aside = np.abs(state.stack(column, "x") - state.stack(Column.of(thing), "x"))
+    height = 0.0 if thing.type.is_a(SURFACE) else state.stack(Column.of(thing), "y")
     separation: Array = np.hypot(aside, state.stack(column, "y") - height)
     return separation
 

@@ -23,13 +23,14 @@ from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.placements import GAP, Placement, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, TransitSkill
-from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, yaw_of
+from slap_ros.domains.tabletop.state_access import box_of, held_body, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY
 from slap_ros.relational import Object, State
+from slap_ros.worlds.features import pose_of
 
 LIFT = 0.02  # m, of a block that counts as picked; the fingers go as far in a control step
 TABLE_MARGIN = 0.05  # m, of places on the table from its edges

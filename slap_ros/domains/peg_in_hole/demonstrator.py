@@ -11,17 +11,12 @@ from slap_ros.core import Policy, Script
 from slap_ros.domains.benchtop.approach import UP, acted_on, carried, make_approach
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, GoalOf, HandGoal
 from slap_ros.domains.benchtop.scripts import Move, follow, grasp, over, release
-from slap_ros.domains.benchtop.state_access import (
-    axis_of,
-    hand_position,
-    hand_yaw,
-    pose_of,
-    position_of,
-)
+from slap_ros.domains.benchtop.state_access import axis_of, hand_position, hand_yaw, position_of
 from slap_ros.domains.peg_in_hole.model import INSERT, PICK
 from slap_ros.domains.peg_in_hole.scenery import FACE, PEG_LENGTH, PEG_RADIUS
 from slap_ros.geometry.pose import Vector, from_yaw, rotate
 from slap_ros.relational import Object, State
+from slap_ros.worlds.features import pose_of
 
 BEHIND = 0.03  # the middle of a peg, it is grasped: so the fingers stay out of the plate's way
 LIFT = 0.05  # of a peg that was picked

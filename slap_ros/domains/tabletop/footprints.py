@@ -67,6 +67,11 @@ class OrderedSums:
         return sums
 
 
+def products_of_parts(q: Array) -> Array:
+    """All products of two parts of quaternions: shape (..., 16), of parts of shape (..., 4)."""
+    return (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
+
+
 TO_EDGES = _to_edges()
 _EDGES = OrderedSums.of(TO_EDGES)
 HALVES = (*("half_x",) * 2, *("half_y",) * 2, *("half_z",) * 2, "half_x", "half_y", "half_z")
@@ -81,7 +86,7 @@ def unit_edges(q: Array) -> Array:
     Returns:
         Shape (..., cubes, 9).
     """
-    return _EDGES((q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16))
+    return _EDGES(products_of_parts(q))
 
 
 def complex_of(pairs: Array) -> Complex:

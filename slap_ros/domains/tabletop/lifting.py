@@ -14,16 +14,15 @@ from collections.abc import Callable
 
 from slap_ros.domains.tabletop.state_access import (
     JOINT_NAMES,
-    POSE_NAMES,
     grasp_of,
     held_body,
     joints_of,
-    pose_of,
     robot_of,
 )
 from slap_ros.domains.tabletop.visualization import SceneOf
 from slap_ros.motion import linear_motion, shifted
 from slap_ros.relational import Object, State
+from slap_ros.worlds.features import pose_features, pose_of
 from slap_ros.worlds.panda import grasp_pose
 
 CLEAR = 0.006  # m, over what it touches: more than predicates, and errors of height, allow for
@@ -65,5 +64,5 @@ def _lifted(state: State, held: Object, rise: float) -> State:
     pose = grasp_pose(joints).compose(grasp_of(state))
     robot = robot_of(state)
     changes = {(robot, name): q for name, q in zip(JOINT_NAMES, joints, strict=True)}
-    placed = zip(POSE_NAMES, (*pose.position, *pose.quaternion), strict=True)
-    return state.replace(changes | {(held, name): value for name, value in placed})
+    placed = {(held, name): value for name, value in pose_features(pose).items()}
+    return state.replace(changes | placed)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from slap_ros.domains.tabletop.state_access import GRASP_NAMES, JOINT_NAMES, bodies, single
+from slap_ros.domains.tabletop.state_access import GRASP_NAMES, JOINT_NAMES, bodies
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.predicates import Bools
@@ -229,7 +229,7 @@ def separations(state: State, thing: Object, column: Column) -> Array:
     """
     if thing.type.is_a(ROBOT):
         return distances_above(state, hand_frame(state), column, 0.0)
-    between = state.gather(column, POSITION) - state.gather(single(thing), POSITION)
+    between = state.gather(column, POSITION) - state.gather(Column.of(thing), POSITION)
     distances: Array = np.sqrt(np.square(between).sum(axis=-1))
     return distances
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from slap_ros.domains.tabletop.state_access import pose_of
 from slap_ros.domains.tabletop.visualization import SceneOf
 from slap_ros.relational import Object, State
-from slap_ros.worlds.features import POSE_FEATURES, VELOCITY_FEATURES
+from slap_ros.worlds.features import POSE_FEATURES, VELOCITY_FEATURES, pose_of
 from slap_ros.worlds.joint_space.settling import resting_poses
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from slap_ros.core import Action, Policy
 from slap_ros.domains.tabletop.memory import memoized
-from slap_ros.domains.tabletop.state_access import joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.timing import ROUNDING, Timing
 from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
@@ -21,6 +21,7 @@ from slap_ros.geometry.pose import Pose
 from slap_ros.motion import Joints, linear_motion, shifted
 from slap_ros.portable_math import on_grid
 from slap_ros.relational import Object, State
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.panda import grasp_pose
 
 STEP_LIMIT = 100  # environment steps

@@ -11,12 +11,11 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.motion import Joints
 from slap_ros.relational import Column, Layout, Object, State
-from slap_ros.worlds.features import BODY_FEATURES, JOINT_FEATURES, POSE_FEATURES
+from slap_ros.worlds.features import BODY_FEATURES, JOINT_FEATURES, pose_of
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.panda import GRASP_POINT
 
 JOINT_NAMES = tuple(feature.name for feature in JOINT_FEATURES)
-POSE_NAMES = tuple(feature.name for feature in POSE_FEATURES)
 GRASP_NAMES = tuple(feature.name for feature in GRASP_FEATURES)
 HALF_NAMES = ("half_x", "half_y", "half_z")  # of what is a box: half its edges
 
@@ -53,12 +52,6 @@ def grasp_of(state: State) -> Pose:
     return Pose((x, y, z - GRASP_POINT), (qx, qy, qz, qw))
 
 
-def pose_of(state: State, obj: Object) -> Pose:
-    """Where an object is."""
-    x, y, z, qx, qy, qz, qw = _features(state, obj, POSE_NAMES)
-    return Pose((x, y, z), (qx, qy, qz, qw))
-
-
 def box_of(state: State, obj: Object) -> OrientedBox:
     """An object that is a box, and says so by its features."""
     half_x, half_y, half_z = _features(state, obj, HALF_NAMES)
@@ -78,12 +71,6 @@ def robot_of(state: State) -> Object:
     return robot
 
 
-@lru_cache(maxsize=256)
-def single(obj: Object) -> Column:
-    """A column of one object."""
-    return Column((obj,))
-
-
 def _features(state: State, obj: Object, names: tuple[str, ...]) -> list[float]:
-    values: list[float] = state.gather(single(obj), names)[0].tolist()
+    values: list[float] = state.gather(Column.of(obj), names)[0].tolist()
     return values

@@ -8,10 +8,11 @@ from collections.abc import Callable
 
 from slap_ros.core import Animate, VisibleBody
 from slap_ros.domains import visualization
-from slap_ros.domains.tabletop.state_access import finger_of, joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import finger_of, joints_of
 from slap_ros.geometry.pose import IDENTITY
 from slap_ros.meshes.solid import Solid
 from slap_ros.relational import State
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.joint_space.scene import Body, Scene
 from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.panda import CONTROL_PERIOD_S

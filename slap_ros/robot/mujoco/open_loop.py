@@ -13,8 +13,8 @@ import math
 from dataclasses import dataclass
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.geometry.pose import Pose, Vector, conjugate, dot, rotate
-from slap_ros.relational import Object, State
+from slap_ros.geometry.pose import Vector, conjugate, dot, rotate
+from slap_ros.relational import State
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.limits import PANDA, Limits
 from slap_ros.robot.mujoco.contact_state import measured_state
@@ -25,8 +25,7 @@ from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.scene import ContactScene
-from slap_ros.worlds.features import POSE_FEATURES
-from slap_ros.worlds.layout_index import pose_of
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.panda import grasp_pose
 
 COMING_TO_REST_S = 1.0  # at the end, for what was let go
@@ -116,7 +115,7 @@ class OpenLoopPlayer:
             thing = state.layout.object(name)
             if state.get(thing, "held") > 0.5:
                 here = hand.inverse().compose(pose)
-                there = _pose(state, robot).inverse().compose(_pose(state, thing))
+                there = pose_of(state, robot).inverse().compose(pose_of(state, thing))
                 self.grasps.append(
                     GraspDeviation(
                         name,
@@ -132,7 +131,3 @@ class OpenLoopPlayer:
 def _angle(first: Vector, second: Vector) -> float:
     """The angle between two unit vectors, rad."""
     return math.acos(min(1.0, max(-1.0, dot(first, second))))
-
-
-def _pose(state: State, obj: Object) -> Pose:
-    return pose_of([float(state.get(obj, feature.name)) for feature in POSE_FEATURES])
