@@ -12,6 +12,7 @@ each operator.
 from __future__ import annotations
 
 import heapq
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -238,6 +239,7 @@ class Explorer:
         self._approacher = Approacher(domain, task.initial_state)
         self._indexed: tuple[Vertex, Mapping[int, int]] | None = None  # of the latest vertex
         self._way_on = WayOn(problem, self.graph.goal)
+        self._hits: Counter[tuple[int, int]] = Counter()
         self._steps = 0
 
     @classmethod
@@ -277,6 +279,16 @@ class Explorer:
     def plan_steps(self) -> int:
         """Environment steps of the plan, with no other shortcuts than those kept."""
         return self._plan.predicted_steps
+
+    @property
+    def hits(self) -> Mapping[tuple[int, int], int]:
+        """Rollouts so far that joined two abstract states, masks, which no option joins."""
+        return self._hits
+
+    def signature(self, source: int, target: int) -> Signature:
+        """The signature of a shortcut between two abstract states, masks."""
+        context = context_of(source, learner_interface(self._domain).grasping, self.space)
+        return Signature.of(Change.between(source, target), self.space, context)
 
     def explore(self) -> ExplorationResult:
         """Collect states, roll out from them, value what was reached."""
@@ -477,7 +489,9 @@ class Explorer:
             reached: Rollouts that reached it.
         """
         for source in self._sources(origin):
-            if (self.graph.nodes[source.node], target.node) not in self._joined:
+            pair = self.graph.nodes[source.node], target.node
+            if pair not in self._joined:
+                self._hits[pair] += len(reached.lengths)
                 yield self._candidate(source, origin, target, reached)
 
     def _candidate(
@@ -494,13 +508,10 @@ class Explorer:
         Returns:
             The candidate, whose expected saving may be negative.
         """
-        node = self.graph.nodes[source.node]
-        change = Change.between(node, target.node)
-        context = context_of(node, learner_interface(self._domain).grasping, self.space)
         motions, steps = origin.g - source.g, reached.least
         expected = source.g + ABSORBED_MOTION * motions + steps
         return ShortcutCandidate(
-            Signature.of(change, self.space, context),
+            self.signature(self.graph.nodes[source.node], target.node),
             operator_path_to(source),
             len(reached.lengths),
             motions + steps,

@@ -18,12 +18,10 @@ from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
-from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.explore import ExplorationResult, Explorer
 from slap_ros.shortcuts.saving_bounds import Operators, SavingBound, saving_bounds
 from slap_ros.shortcuts.settings import NEAR, ExplorationSettings, training_settings
-from slap_ros.shortcuts.signature import Change, Signature, context_of
 from slap_ros.shortcuts.training import ProblemKey, problem_key
 from slap_ros.shortcuts.way_on import steps_to_goal
 from slap_ros.skills.domain_choice import DEMONSTRATOR, SHIPPED, DomainChoice
@@ -145,27 +143,22 @@ def savings_in_task(
         explored.pairs,
         explored.environment_steps,
         max(beyond, default=0.0),
-        tuple(_by_skills(explorer, explored, distribution)),
+        tuple(_by_skills(explorer, explored)),
     )
 
 
-def _by_skills(
-    explorer: Explorer, explored: ExplorationResult, distribution: TaskDistribution
-) -> Iterator[PossibleSaving]:
+def _by_skills(explorer: Explorer, explored: ExplorationResult) -> Iterator[PossibleSaving]:
     """Yield what shortcuts in place of the same skills could save, the largest saving first.
 
     Args:
         explorer: Explorer of the task.
         explored: Outcome of exploring it.
-        distribution: Distribution from which the task is drawn.
     """
-    grasping = learner_interface(distribution.make_domain()).grasping
-    nodes, space = explorer.graph.nodes, explorer.space
+    nodes = explorer.graph.nodes
 
     def key(pair: tuple[int, int]) -> ProblemKey:
         source, target = (nodes[node] for node in pair)
-        context = context_of(source, grasping, space)
-        return problem_key(Signature.of(Change.between(source, target), space, context))
+        return problem_key(explorer.signature(source, target))
 
     found: dict[ProblemKey, float] = {}
     for one in explored.candidates:
