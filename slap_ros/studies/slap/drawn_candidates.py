@@ -156,6 +156,9 @@ def learn_candidate(
         operator_steps: Mean environment steps of each operator, by name.
         settings: Settings of the training.
         plain: Environment steps of the plans of validation tasks without it, by the task's index.
+
+    Returns:
+        What came of it; nothing learned where it can begin nowhere.
     """
     starts = tuple(_starts(distribution, candidate, operator_steps, settings.starts))
     if not starts:
