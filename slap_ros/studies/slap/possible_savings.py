@@ -29,6 +29,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import RESULTS, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_each, plot_whole
+from slap_ros.studies.slap.explored_tasks import explore_tasks
 from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -267,18 +268,8 @@ def study(
     """
     exploration = training_settings(settings, distribution.make_domain()).exploration
     jobs = {f"task {index}": (distribution, index, exploration) for index in range(tasks)}
-    results = runner.run(
-        f"exploring {distribution.domain.name}",
-        savings_in_task,
-        lambda data: data if isinstance(data, str) else TaskSavings.from_json(data),
-        jobs,
-        failure=lambda one: f"has no plan: {one}" if isinstance(one, str) else None,
-    )
-    found = [one for one in results.values() if not isinstance(one, str)]
-    if not found:
-        raise UnsolvableError(
-            f"none of the {tasks} tasks has a plan: {next(iter(results.values()))}"
-        )
+    decode, name = TaskSavings.from_json, distribution.domain.name
+    found = list(explore_tasks(runner, name, savings_in_task, decode, jobs).values())
     rows = rows_of(found)
     return StudyReport(
         study="possible_savings",

@@ -12,7 +12,6 @@ from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.left_out import Tell
 from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED, PLAN, SHORTCUT
-from slap_ros.errors import UnsolvableError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.shortcuts import jobs as training_jobs
@@ -31,6 +30,7 @@ from slap_ros.studies.slap.drawn_candidates import (
     learn_candidate,
     problems_of,
 )
+from slap_ros.studies.slap.explored_tasks import explore_tasks
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -174,19 +174,9 @@ def _explore(
     runner: JobRunner,
 ) -> list[TaskCandidates]:
     """The candidates of each task that has a plan."""
-    results = runner.run(
-        f"exploring {distribution.domain.name}",
-        candidates_of_task,
-        lambda data: data if isinstance(data, str) else TaskCandidates.from_json(data),
-        {f"task {i}": (distribution, i, settings, candidates) for i in range(tasks)},
-        failure=lambda one: f"has no plan: {one}" if isinstance(one, str) else None,
-    )
-    found = [one for one in results.values() if not isinstance(one, str)]
-    if not found:
-        raise UnsolvableError(
-            f"none of the {tasks} tasks has a plan: {next(iter(results.values()))}"
-        )
-    return found
+    jobs = {f"task {i}": (distribution, i, settings, candidates) for i in range(tasks)}
+    decode, name = TaskCandidates.from_json, distribution.domain.name
+    return list(explore_tasks(runner, name, candidates_of_task, decode, jobs).values())
 
 
 def _plan_without(

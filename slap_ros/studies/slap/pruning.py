@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import MUTED, PLAN
-from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.experiment import Trial
 from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.task_distribution import TaskDistribution
@@ -28,6 +28,7 @@ from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOpti
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.slap.explored_tasks import explore_tasks
 from slap_ros.studies.slap.library_plans import LibraryPlans, plan_with
 from slap_ros.studies.slap.trainings import TrainingFolder, described
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
@@ -116,26 +117,12 @@ def explore(
         for training in trainings
         for index in range(tasks)
     }
-    found = runner.run(
-        f"exploring {trainings[0].domain.name}",
-        training_jobs.try_to_explore,
-        _decode,
-        jobs,
-        failure=lambda one: f"not explored: {one}" if isinstance(one, str) else None,
-    )
-    pruned = [
+    decode, domain = ExplorationResult.from_json, trainings[0].domain.name
+    found = explore_tasks(runner, domain, training_jobs.try_to_explore, decode, jobs)
+    return tuple(
         PrunedCandidates(jobs[name][0].seed, jobs[name][1], explored)
         for name, explored in found.items()
-        if not isinstance(explored, str)
-    ]
-    if not pruned:
-        raise UnsolvableError(f"none of the {len(jobs)} tasks could be explored")
-    return tuple(pruned)
-
-
-def _decode(data: Any) -> ExplorationResult | str:
-    """What exploring came to, or why it could not be done."""
-    return data if isinstance(data, str) else ExplorationResult.from_json(data)
+    )
 
 
 def explored_in(
