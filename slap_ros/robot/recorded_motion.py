@@ -29,6 +29,8 @@ from slap_ros.worlds.features import JOINT_FEATURES
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.panda import MAX_STEP
 
+STOPS = 1e-3  # m, in a step: fingers on their way come 15 times as much closer
+
 
 @dataclass(frozen=True)
 class RecordedWaypoint:
@@ -43,12 +45,13 @@ class RecordedWaypoint:
         """Refuse fingers that closed around nothing, unless those of the recording did as well.
 
         Args:
-            gap: Distance between the fingers once they have closed, m.
+            gap: Distance between the fingers once they have closed, m; shut ones may measure
+                less than 0.
 
         Raises:
             ControllerAbortedError: They are closer together than around what should be there.
         """
-        if gap < GRASPED * self.gap:
+        if max(gap, 0.0) < GRASPED * self.gap:
             raise ControllerAbortedError(
                 f"the fingers closed around nothing in step {self.step}: {gap:.3f} m apart, "
                 f"{self.gap:.3f} m in the recording"
@@ -169,11 +172,18 @@ def _pressing(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
         elif now and not before:
             opened = next((k for k in range(step, len(told)) if not told[k]), len(told))
             met = next((k for k in range(step, opened) if _holds(states[k])), None)
-            closes = step if met is None else min(met + 1, opened - 1)
+            stopped = _stopped(states, step, opened) if met is None else met
+            closes = min(stopped + 1, opened - 1)
             acts[closes] = GripperAction.CLOSE, 0.0 if met is None else _gap(states[met])
     for step, state in enumerate(states[1:], start=1):
         action, gap = acts.get(step, (GripperAction.KEEP, gap))
         yield RecordedWaypoint(step, _joints(state), action, gap)
+
+
+def _stopped(states: Sequence[State], closing: int, opened: int) -> int:
+    """The step in which fingers that hold nothing have closed: around a handle, or altogether."""
+    ways = (_gap(states[k - 1]) - _gap(states[k]) for k in range(closing + 1, opened))
+    return next((closing + i for i, way in enumerate(ways, start=1) if way < STOPS), opened - 1)
 
 
 def _gap(state: State) -> float:

@@ -10,8 +10,8 @@ from slap_ros.relational import State
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.worlds.contact.hand import hand_at
 from slap_ros.worlds.contact.scene import ContactScene
-from slap_ros.worlds.contact.snapshot import ContactIndex
-from slap_ros.worlds.panda import grasp_pose
+from slap_ros.worlds.contact.snapshot import ContactIndex, Opening, stopped_at_ends
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, grasp_pose
 
 
 def measured_state(scene: ContactScene, template: State, plant: MujocoPlant) -> State:
@@ -23,14 +23,20 @@ def measured_state(scene: ContactScene, template: State, plant: MujocoPlant) -> 
         plant: Plant of the same scene.
     """
     index = ContactIndex.of(scene, template.layout)
-    pose, finger, held = grasp_pose(plant.joints), 0.5 * plant.gap, plant.grasped()
+    pose, held = grasp_pose(plant.joints), plant.grasped()
+    finger = min(max(0.5 * plant.gap, FINGER_CLOSED), FINGER_OPEN)
     x, y, _, _ = pose.quaternion
-    hand = hand_at(pose.position, 2.0 * math.atan2(y, x), finger, closing=held is not None)
+    hand = hand_at(pose.position, 2.0 * math.atan2(y, x), finger, plant.closing)
     motions, names = plant.motions(), [body.name for body in scene.free]
+    openings = plant.openings()
     measured = index.read(template)._replace(
         joints=tuple(plant.joints),
         hand=hand._replace(pose=pose),
         bodies=tuple(motions[name] for name in names),
+        openings=tuple(
+            Opening(*stopped_at_ends(*openings[body.name], body.joint.high))
+            for body in scene.jointed
+        ),
         held=None if held is None else names.index(held),
     )
     return index.write(template, measured)

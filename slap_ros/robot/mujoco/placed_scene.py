@@ -8,11 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from slap_ros.errors import InvalidSceneError
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
 from slap_ros.worlds.bodies import Material, RigidBody
-from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.scene import ContactScene, JointedBody
 from slap_ros.worlds.contact.snapshot import ContactIndex
 from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.snapshot import SceneIndex
@@ -28,6 +27,14 @@ class PlacedBody(NamedTuple):
     material: Material  # without mass where it does not move
 
 
+class PlacedJointedBody(NamedTuple):
+    """A jointed body of a scene, where a state has it and how far open."""
+
+    body: JointedBody
+    pose: Pose  # in the base's frame
+    opening: float  # m or rad
+
+
 @dataclass(frozen=True)
 class PlacedScene:
     """Bodies around a Panda, and how its arm and its fingers are.
@@ -37,19 +44,20 @@ class PlacedScene:
         joints: Joint positions of the arm, rad.
         fingers: Distance of the left and of the right finger from the middle, m.
         closing: Whether the fingers press on something, or are about to.
+        jointed: Bodies of which a part slides or turns.
     """
 
     bodies: tuple[PlacedBody, ...]
     joints: tuple[float, ...]
     fingers: tuple[float, float]
     closing: bool
+    jointed: tuple[PlacedJointedBody, ...] = ()
 
     @classmethod
     def of(cls, scene: PandaScene, state: State) -> PlacedScene:
         """A scene as a state has it.
 
         Raises:
-            InvalidSceneError: A body has a part that slides or turns.
             InvalidStateError: The state does not have the scene's bodies.
         """
         if isinstance(scene, ContactScene):
@@ -67,19 +75,17 @@ class PlacedScene:
 
     @classmethod
     def _of_forces(cls, scene: ContactScene, state: State) -> PlacedScene:
-        if scene.jointed:
-            raise InvalidSceneError(
-                f"MuJoCo cannot express {scene.jointed[0].name}: a part of it slides or turns"
-            )
         index = ContactIndex.of(scene, state.layout)
-        snapshot, fixed = index.read(state), index.fixed_poses(scene.fixed, state)
+        snapshot, placement = index.read(state), index.placement(scene, state)
         free = [motion.pose for motion in snapshot.bodies]
         materials = [body.material for body in scene.free]
+        openings = [opening.position for opening in snapshot.openings]
         return cls(
-            (*_fixed(scene, fixed), *map(PlacedBody, scene.free, free, materials)),
+            (*_fixed(scene, placement.fixed), *map(PlacedBody, scene.free, free, materials)),
             snapshot.joints,
             snapshot.hand.fingers,
             snapshot.hand.closing,
+            tuple(map(PlacedJointedBody, scene.jointed, placement.jointed, openings)),
         )
 
 

@@ -29,6 +29,7 @@ from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.placed_scene import PandaScene, PlacedScene
 from slap_ros.worlds.contact.contacts import ContactPoint, Side, Surface, grasped
+from slap_ros.worlds.contact.snapshot import Opening
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINTS, grasp_pose
 
@@ -45,7 +46,7 @@ Array = NDArray[np.float64]
 
 
 class MujocoPlant:
-    """An arm, its fingers and free bodies.
+    """An arm, its fingers, free bodies, and drawers and lids.
 
     Args:
         model: Compiled ``mujoco.MjModel`` of a scene.
@@ -64,8 +65,11 @@ class MujocoPlant:
         free = {name: Surface(Side.FREE, i) for i, name in enumerate(self._names)}
         self._surfaces = {model.body(name).id: one for name, one in (FINGERS | free).items()}
         begun = PlacedScene.of(scene, state)
+        self._openings = [model.joint(jointed.body.name) for jointed in begun.jointed]
         self._data.qpos[self._arm_at] = begun.joints
         self._data.qpos[self._fingers_at] = begun.fingers
+        for joint, jointed in zip(self._openings, begun.jointed, strict=True):
+            self._data.qpos[joint.qposadr] = jointed.opening
         self.command(begun.joints)
         self.command_fingers(FINGER_CLOSED if begun.closing else FINGER_OPEN)
         self._settle()
@@ -109,6 +113,11 @@ class MujocoPlant:
         return float(sum(self._data.qvel[self._finger_speeds]))
 
     @property
+    def closing(self) -> bool:
+        """Whether the fingers were last told to shut."""
+        return self._fingers_to <= FINGER_CLOSED
+
+    @property
     def at_rest(self) -> bool:
         """Whether nothing moves."""
         return bool(np.abs(self._data.qvel).max() < RESTING)
@@ -129,6 +138,14 @@ class MujocoPlant:
             spin, speed = _vector(velocity[:3]), _vector(velocity[3:])
             found[name] = BodyState(pose, speed, spin)
         return found
+
+    def openings(self) -> dict[str, Opening]:
+        """How far jointed bodies are open, and how fast they open, by name."""
+        qpos, qvel = self._data.qpos, self._data.qvel
+        return {
+            joint.name: Opening(float(qpos[joint.qposadr[0]]), float(qvel[joint.dofadr[0]]))
+            for joint in self._openings
+        }
 
     def grasped(self) -> str | None:
         """What both fingers press on from opposite sides, by name; None where that is nothing."""

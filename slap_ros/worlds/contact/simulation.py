@@ -30,7 +30,12 @@ from slap_ros.worlds.contact.scene import (
     JointedBody,
     Part,
 )
-from slap_ros.worlds.contact.snapshot import ContactSnapshot, Opening, Placement
+from slap_ros.worlds.contact.snapshot import (
+    ContactSnapshot,
+    Opening,
+    Placement,
+    stopped_at_ends,
+)
 from slap_ros.worlds.contact.urdf import LEFT, MOVING, RIGHT, hand_urdf, jointed_urdf
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
@@ -226,8 +231,8 @@ class ContactSimulation:
     def _hand_state(self, before: HandState) -> HandState:
         pose, velocity, angular_velocity = self._motion(self._hand)
         left, right = pybullet.getJointStates(self._hand, FINGERS, self.client)
-        left_at, left_velocity = _stopped(left[0], left[1], FINGER_OPEN)
-        right_at, right_velocity = _stopped(right[0], right[1], FINGER_OPEN)
+        left_at, left_velocity = stopped_at_ends(left[0], left[1], FINGER_OPEN)
+        right_at, right_velocity = stopped_at_ends(right[0], right[1], FINGER_OPEN)
         return HandState(
             pose,
             velocity,
@@ -290,7 +295,7 @@ class ContactSimulation:
 
     def _opening(self, index: int) -> Opening:
         position, velocity, *_ = pybullet.getJointState(self._jointed[index], MOVING, self.client)
-        return Opening(*_stopped(position, velocity, self.scene.jointed[index].joint.high))
+        return Opening(*stopped_at_ends(position, velocity, self.scene.jointed[index].joint.high))
 
     def _contact_points(self) -> Iterable[ContactPoint]:
         for point in pybullet.getContactPoints(physicsClientId=self.client):
@@ -416,12 +421,3 @@ def _geometry(part: Part) -> dict[str, Any]:
         }
     assert isinstance(part, BoxPart)
     return {"shapeType": pybullet.GEOM_BOX, "halfExtents": part.half_extents_m}
-
-
-def _stopped(position: float, velocity: float, high: float) -> tuple[float, float]:
-    """A joint's position and velocity, stopped at its ends, which PyBullet lets it overrun."""
-    if position < 0.0:
-        return 0.0, max(velocity, 0.0)
-    if position > high:
-        return high, min(velocity, 0.0)
-    return position, velocity

@@ -41,6 +41,21 @@ class Opening(NamedTuple):
         return self.velocity == 0.0
 
 
+def stopped_at_ends(position: float, velocity: float, high: float) -> tuple[float, float]:
+    """A joint's position and velocity, stopped at its ends, which engines let it overrun.
+
+    Args:
+        position: Position, m or rad; the least is 0.
+        velocity: Velocity, m/s or rad/s.
+        high: Largest position, m or rad.
+    """
+    if position < 0.0:
+        return 0.0, max(velocity, 0.0)
+    if position > high:
+        return high, min(velocity, 0.0)
+    return position, velocity
+
+
 class Placement(NamedTuple):
     """Where those bodies stand that do not move, in the order of the scene."""
 
