@@ -148,7 +148,6 @@ def _pddl(domain: Domain, operators: Sequence[LiftedOperator], task: Task) -> di
 def _write(folder: Path, files: Mapping[str, str]) -> None:
     """Write texts by file name."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
             write_whole(folder / name, text)
             console.print(f"wrote {folder / name}")
