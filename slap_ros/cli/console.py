@@ -204,6 +204,11 @@ def warn(text: str) -> None:
     console.print(styled("warning", "yellow", f" {text}"))
 
 
+def print_line(line: str) -> None:
+    """Print a line of data on stdout, such as a step of a plan."""
+    _stdout.write_line(visible(line))
+
+
 def print_json(data: Any) -> None:
     """Print data on stdout, as JSON in one line."""
     _stdout.write_line(json.dumps(data, allow_nan=False))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Seeds that nobody gave, folders that are missing, other names of commands, completion in a shell."""
+"""Seeds nobody gave, missing folders, other names of commands, and completion in a shell."""
 
 import json
 from pathlib import Path
