@@ -16,7 +16,7 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.sampling import DEFAULT, PAPER
 from slap_ros.shortcuts.settings import training_settings

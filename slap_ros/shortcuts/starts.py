@@ -28,8 +28,8 @@ from slap_ros.planning.options import Option, hold_option
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import AtomSpace, State
-from slap_ros.shortcuts.explore import OperatorPath
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
+from slap_ros.shortcuts.shortcut_candidate import OperatorPath
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher

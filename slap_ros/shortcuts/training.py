@@ -26,7 +26,7 @@ from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.approaches import APPROACHED
 from slap_ros.shortcuts.demonstrations import ShortcutDemonstration
 from slap_ros.shortcuts.exploration_policies import RANDOM
-from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
+from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
 from slap_ros.shortcuts.learning_attempt import (
     LearningAttempt,
@@ -37,6 +37,7 @@ from slap_ros.shortcuts.learning_attempt import (
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_candidate import OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.shortcuts.signature import Pattern, Signature
 from slap_ros.shortcuts.starts import StartRecord

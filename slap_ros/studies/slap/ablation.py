@@ -27,7 +27,7 @@ from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs, learning_attempt
-from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.settings import OURS, TrainingSettings, training_settings
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
