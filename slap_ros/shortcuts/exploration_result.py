@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import fmean
 from typing import Any
 
 from slap_ros.learning.stored_keys import restored, stored
@@ -46,3 +47,12 @@ class ExplorationResult:
             int(values["environment_steps"]),
             {str(name): float(mean) for name, mean in values["operator_steps"].items()},
         )
+
+
+def mean_operator_steps(explored: Sequence[ExplorationResult]) -> dict[str, float]:
+    """Mean environment steps of each operator over all explored tasks, by name."""
+    steps: dict[str, list[float]] = {}
+    for result in explored:
+        for name, mean in result.operator_steps.items():
+            steps.setdefault(name, []).append(mean)
+    return {name: fmean(means) for name, means in steps.items()}
