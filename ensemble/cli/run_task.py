@@ -118,7 +118,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
     goal = _check_planning(options, domain, task)
     if options.world != SIM:
         # Physics is needed only here: planar domains run without it.
-        from slap_ros.robot.robot_world import require_robot
+        from slap_ros.robot.usable_domains import require_robot
 
         require_robot(domain, task.initial_state)
     if options.world == MUJOCO:
