@@ -18,9 +18,9 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.candidate_groups import rank
 from slap_ros.shortcuts.exploration_result import ExplorationResult, mean_operator_steps
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.sampling import DEFAULT, PAPER
-from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.starts import Start, find_start, restore_starts

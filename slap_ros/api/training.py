@@ -22,7 +22,8 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.policies.library_files import SHORTCUT, require_places
 from slap_ros.shortcuts.candidate_groups import CandidateGroup
-from slap_ros.shortcuts.settings import TrainingSettings, training_settings
+from slap_ros.shortcuts.named_settings import training_settings
+from slap_ros.shortcuts.settings import TrainingSettings
 from slap_ros.shortcuts.shipped import require_same_skills
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_library, save_library
@@ -141,7 +142,7 @@ def chosen_settings(
 
     Raises:
         InvalidParameterError: There are none of that name, or they cannot be changed so.
-        InvalidDomainError: See :func:`~slap_ros.shortcuts.settings.training_settings`.
+        InvalidDomainError: See :func:`~slap_ros.shortcuts.named_settings.training_settings`.
     """
     chosen = training_settings(name, domain)
     parsed = parse_changes(change_texts(changes), TrainingSettings)

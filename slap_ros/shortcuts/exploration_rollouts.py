@@ -19,9 +19,9 @@ from slap_ros.shortcuts.exploration_policies import (
     PushAim,
     RandomExploration,
 )
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.exploration_steps import exploration_worlds
 from slap_ros.shortcuts.rollout_origins import RolloutOrigin
-from slap_ros.shortcuts.settings import ExplorationSettings
 
 
 @dataclass

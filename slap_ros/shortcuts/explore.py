@@ -30,10 +30,10 @@ from slap_ros.shortcuts.cheapest_vertices import CheapestVertices
 from slap_ros.shortcuts.exploration_policies import within_reach
 from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.exploration_rollouts import ExplorationRollouts, RolloutHits
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.exploration_steps import most_rollout_steps
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.rollout_origins import OptionRetracer, RolloutOrigin
-from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.shortcut_candidate import ShortcutCandidate
 from slap_ros.shortcuts.straightened_chains import StraightenedChains
 from slap_ros.shortcuts.straightening import STRAIGHTENED

@@ -29,8 +29,9 @@ from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs, learning_attempt
 from slap_ros.shortcuts.candidate_groups import rank
 from slap_ros.shortcuts.exploration_result import ExplorationResult, mean_operator_steps
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.sampling import Sampling
-from slap_ros.shortcuts.settings import OURS, TrainingSettings, training_settings
+from slap_ros.shortcuts.settings import OURS, TrainingSettings
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord

@@ -20,7 +20,8 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.candidate_groups import problem_key
 from slap_ros.shortcuts.exploration_result import ExplorationResult
-from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import Comparison
