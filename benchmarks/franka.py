@@ -33,9 +33,9 @@ from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.franka.arm import ArmReading, FrankaArm, FrankaSettings, MotionResult
 from slap_ros.robot.franka.limits import JERK, franka_limits
 from slap_ros.robot.franka.simulation import SimulatedFr3
+from slap_ros.robot.gripper import GAP_OPEN, GripperAction
 from slap_ros.robot.limits import FR3, Limits, Workspace
 from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
-from slap_ros.robot.robot_world import GAP_OPEN, GripperAction
 from slap_ros.robot.stretches import Stretch
 from slap_ros.studies.comparison import spread_of
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport

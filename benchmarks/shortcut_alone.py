@@ -16,14 +16,14 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.candidate_groups import rank
+from slap_ros.shortcuts.exploration_result import ExplorationResult, mean_operator_steps
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.sampling import DEFAULT, PAPER
-from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.starts import Start, find_start, restore_starts
-from slap_ros.shortcuts.training import mean_steps, rank
 from slap_ros.skills.domain_choice import DomainChoice
 
 FRESH = 3_000_000  # the first seed of its tasks
@@ -36,7 +36,7 @@ def starts_of(
     """Starts of a shortcut in ``count`` tasks of a seed, as training looks for them."""
     patterns = shortcut.signature.patterns
     group = next(group for group in rank(explored) if group.signature.patterns == patterns)
-    steps = mean_steps(explored)
+    steps = mean_operator_steps(explored)
     found = (
         find_start(domain, FRESH + seed, index, shortcut.signature, group.operator_path, steps)
         for index in range(count)

@@ -12,7 +12,7 @@ from slap_ros.acquisition.proposals.attempt_log import AttemptLog
 from slap_ros.acquisition.proposals.inquiry import Inquiry
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.language.settings import read_settings
-from slap_ros.shortcuts.settings import NEAR
+from slap_ros.shortcuts.named_settings import NEAR
 
 
 @dataclass(frozen=True)

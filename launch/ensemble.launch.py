@@ -26,6 +26,8 @@ from launch.actions import (
     SetEnvironmentVariable,
 )
 from launch.conditions import IfCondition
+from launch.events.process import ProcessExited
+from launch.logging import get_logger
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -154,6 +156,7 @@ def _node(name: str, given: Mapping[str, str], **options: object) -> Node:
     taken = {key: _value(key, given[key]) for key in TAKEN[name] if key in given}
     if name == "recorder_node":
         taken["bag"] = ParameterValue(given["record"], value_type=str)
+        options["on_exit"] = _say_unrecorded
     if name == "mujoco_robot" and given["camera"] == "true":
         taken["camera"] = ParameterValue(True, value_type=bool)
     return Node(
@@ -165,6 +168,15 @@ def _node(name: str, given: Mapping[str, str], **options: object) -> Node:
         output="screen",
         **options,
     )
+
+
+def _say_unrecorded(_: ProcessExited, context: LaunchContext) -> None:
+    """Say that the recorder has ended before the others. They go on: a robot may be moving."""
+    if not context.is_shutdown:
+        get_logger("recorder_node").error(
+            "recorder_node has ended: NOTHING IS RECORDED from now on, and the other nodes go on. "
+            "What it has recorded stays readable. To record, launch again with another record:="
+        )
 
 
 def _value(name: str, text: str) -> ParameterValue:

@@ -98,9 +98,9 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_goal
 from slap_ros.relational import GroundAtom, State
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.horizon import Horizon
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
-from slap_ros.robot.robot_world import GripperAction
 
 POLL_PERIOD = 0.02  # s, between two looks at what is measured
 # What keeps a task from being begun, as long as it lasts.

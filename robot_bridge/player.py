@@ -39,8 +39,8 @@ from slap_ros.errors import (
 from slap_ros.relational import State
 from slap_ros.robot.blended_run import BlendedRun
 from slap_ros.robot.dry_run import DryRun
+from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
-from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.stretches import Stretch
 from slap_ros.worlds.features import POSE_FEATURES
 

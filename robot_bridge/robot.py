@@ -19,7 +19,8 @@ from robot_bridge.sensors import Sensors
 from slap_ros.core import Domain
 from slap_ros.errors import ControllerAbortedError, NoDetectionError, NoJointStateError
 from slap_ros.relational import State
-from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
+from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
+from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 
 HELD_GAP = 0.002  # m between fingers that closed, above which there is something between them

@@ -142,11 +142,16 @@ def read_text(path: Path, limit: int = MAX_BYTES) -> str:
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file, text in UTF-8: at every moment there is the old one, or the new one, whole.
 
+    Args:
+        path: Path of the file; missing folders are made.
+        content: All that the file is to have.
+
     Raises:
         OSError: It cannot be written, and names the file; the old one is untouched.
     """
     draft = path.with_name(f".{path.name}.tmp")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         draft.write_bytes(content.encode() if isinstance(content, str) else content)
         draft.replace(path)
     except OSError as error:  # a full disk names no file

@@ -25,9 +25,9 @@ from slap_ros.errors import ErrorCode, TaskCanceledError
 from slap_ros.robot.blended_run import BlendedRun
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.franka.limits import JERK, franka_limits
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.limits import Limits
 from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
-from slap_ros.robot.robot_world import GripperAction
 
 
 def require_yes(agreed: bool) -> None:

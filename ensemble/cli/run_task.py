@@ -40,7 +40,7 @@ from slap_ros.cli.render import picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.skill_choice import open_chosen
 from slap_ros.core import Domain, Task, task_with_goal
-from slap_ros.errors import InvalidParameterError, NoSkillsError
+from slap_ros.errors import ErrorCode, InvalidParameterError, NoSkillsError
 from slap_ros.evaluation.metrics import RunMetrics, known
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.interfaces import STATE
@@ -89,9 +89,11 @@ def run_task(options: RunOptions) -> int:
         metrics = _run(replace(request, settings=settings), options, keep_states)
         if options.json:
             print_json(metrics.as_json())
-        _conclude(metrics, options.record)
+        # Another run has taken the name meanwhile: the bag there is that one's.
+        has_bag = metrics.error_code != ErrorCode.BAG_EXISTS
+        _conclude(metrics, options.record if has_bag else None)
         code = 0
-        if bag is not None and options.report is not None:
+        if bag is not None and has_bag and options.report is not None:
             from slap_ros.cli.report import write_report
 
             code = write_report([bag], options.report)
@@ -116,7 +118,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
     goal = _check_planning(options, domain, task)
     if options.world != SIM:
         # Physics is needed only here: planar domains run without it.
-        from slap_ros.robot.robot_world import require_robot
+        from slap_ros.robot.usable_domains import require_robot
 
         require_robot(domain, task.initial_state)
     if options.world == MUJOCO:

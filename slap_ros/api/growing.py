@@ -25,9 +25,10 @@ from slap_ros.files import require_writable, sole_use, write_whole
 from slap_ros.learning.grown_libraries import GrownLibraries
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.policies.library_files import replace_folder
+from slap_ros.shortcuts.candidate_groups import CandidateGroup
 from slap_ros.shortcuts.jobs import VALIDATION
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
-from slap_ros.shortcuts.training import CandidateGroup, TrainingCallback
+from slap_ros.shortcuts.training_callback import TrainingCallback
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import SkillLibrary
 
@@ -283,20 +284,20 @@ class TrainingNotes:
         self.on_progress = callback.on_progress
 
     def on_left_out(self, use: str, index: int, reason: str) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self._callback.on_left_out(use, index, reason)
         self.unsolved += use == VALIDATION.use
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self._callback.on_ranked(ranked)
 
     def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self._callback.on_learning(name, folder, total_steps)
 
     def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self._callback.on_validated(name, before, after, kept)
         solved = after if math.isfinite(after) else None
         self.tried.append(TriedShortcut(name, before, solved, kept))

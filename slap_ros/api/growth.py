@@ -19,7 +19,8 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.grown_libraries import GrownLibraries
 from slap_ros.shortcuts.exploration_steps import usual_steps
-from slap_ros.shortcuts.settings import NEAR, TrainingSettings
+from slap_ros.shortcuts.named_settings import NEAR
+from slap_ros.shortcuts.settings import TrainingSettings
 
 STEPS = 1_000_000
 USUAL_SHARE = 0.5  # of the steps of a learned skill until it has failed, that it usually takes

@@ -21,12 +21,15 @@ from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.policies.library_files import SHORTCUT, require_places
-from slap_ros.shortcuts.settings import TrainingSettings, training_settings
+from slap_ros.shortcuts.candidate_groups import CandidateGroup
+from slap_ros.shortcuts.named_settings import training_settings
+from slap_ros.shortcuts.settings import TrainingSettings
 from slap_ros.shortcuts.shipped import require_same_skills
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_library, save_library
 from slap_ros.shortcuts.subgoals import SubgoalTraining
-from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
+from slap_ros.shortcuts.training import Training
+from slap_ros.shortcuts.training_callback import TrainingCallback
 from slap_ros.skills.domain_choice import WORDS, DomainChoice
 from slap_ros.whole_numbers import require_whole
 
@@ -35,19 +38,19 @@ class Unwatched:
     """Receives the events of a training, and does nothing with them."""
 
     def on_progress(self, what: str, done: int, total: int) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
 
     def on_left_out(self, use: str, index: int, reason: str) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
 
     def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
 
     def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
 
 
 def train(
@@ -139,7 +142,7 @@ def chosen_settings(
 
     Raises:
         InvalidParameterError: There are none of that name, or they cannot be changed so.
-        InvalidDomainError: See :func:`~slap_ros.shortcuts.settings.training_settings`.
+        InvalidDomainError: See :func:`~slap_ros.shortcuts.named_settings.training_settings`.
     """
     chosen = training_settings(name, domain)
     parsed = parse_changes(change_texts(changes), TrainingSettings)

@@ -51,7 +51,7 @@ def write_video(
     Args:
         domain: Domain of the states.
         states: States, in order.
-        path: File to write; its ending gives the format.
+        path: File to write; its ending gives the format. Missing folders are made.
         size: Size of the frames; None for the domain's own.
         on_frame: Function that receives the number of frames that are done.
 
@@ -61,6 +61,7 @@ def write_video(
     """
     require_renderable(domain, states[0], path)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         _animation(domain)(path, states, size, on_frame)
     except OSError as error:
         raise StorageFullError(f"cannot write {path}: {error.strerror or error}") from error

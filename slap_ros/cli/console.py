@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec
 
 import typer
 
+from slap_ros.cli.streams import Stdout
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.redaction import without_secrets
 from slap_ros.signals import TerminatedError, exit_code, forget_interrupt, signals_raised
@@ -78,6 +79,7 @@ class Stderr:
 
 
 console = Stderr()
+_stdout = Stdout()
 
 
 def styled(label: str, style: str, rest: str = "") -> Text:
@@ -102,9 +104,8 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
-            with signals_raised():
+            with signals_raised(), _stdout.kept_for_data():
                 code = command(*args, **kwargs)
-                sys.stdout.flush()
         except SlapError as error:
             _fail(error.code, " ".join(str(error).split()), error)
         except KeyboardInterrupt as error:
@@ -112,7 +113,6 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
             _say("terminated" if isinstance(error, TerminatedError) else "interrupted")
             raise typer.Exit(exit_code(error)) from None
         except BrokenPipeError as error:  # whoever read stdout has seen enough
-            _silence_stdout()
             raise typer.Exit(int(ErrorCode.INPUT_OUTPUT)) from error
         except (BrokenExecutor, ChildProcessError) as error:
             advice = "a worker was killed; short of memory? the same command goes on"
@@ -122,9 +122,7 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
             _fail(ErrorCode.OUT_OF_MEMORY, advice, error)
         except OSError as error:
             code = ErrorCode.INPUT_OUTPUT
-            if error.filename is None:
-                _silence_stdout()  # it may be what failed; else nothing is lost
-            elif error.errno in (errno.ENOSPC, errno.EDQUOT):
+            if error.filename is not None and error.errno in (errno.ENOSPC, errno.EDQUOT):
                 code = ErrorCode.STORAGE_FULL
             _fail(code, _os_complaint(error), error)
         except (typer.Exit, typer.Abort):
@@ -147,11 +145,6 @@ def _say(text: str | Text) -> None:
         console.print(text)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
-
-
-def _silence_stdout() -> None:
-    """Let what is still buffered for stdout go nowhere: at exit it would fail again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _os_complaint(error: OSError) -> str:
@@ -211,7 +204,11 @@ def warn(text: str) -> None:
     console.print(styled("warning", "yellow", f" {text}"))
 
 
+def print_line(line: str) -> None:
+    """Print a line of data on stdout, such as a step of a plan."""
+    _stdout.write_line(visible(line))
+
+
 def print_json(data: Any) -> None:
-    """Data on stdout."""
-    sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
-    sys.stdout.flush()
+    """Print data on stdout, as JSON in one line."""
+    _stdout.write_line(json.dumps(data, allow_nan=False))

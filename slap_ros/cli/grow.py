@@ -28,8 +28,8 @@ from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.cli.train import training_bars
 from slap_ros.cli.training_options import BeginWith, Rewarder, TrainingSeed, setting_changes
-from slap_ros.shortcuts.settings import NEAR
-from slap_ros.shortcuts.training import TrainingCallback
+from slap_ros.shortcuts.named_settings import NEAR
+from slap_ros.shortcuts.training_callback import TrainingCallback
 
 ROOM = Path("runs/grown")
 

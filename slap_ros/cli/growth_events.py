@@ -17,7 +17,8 @@ from slap_ros.api.growing import Grown
 from slap_ros.api.growth import GrowthRound
 from slap_ros.cli.console import print_json
 from slap_ros.learning.grown_libraries import GrownLibraries
-from slap_ros.shortcuts.training import CandidateGroup, TrainingCallback
+from slap_ros.shortcuts.candidate_groups import CandidateGroup
+from slap_ros.shortcuts.training_callback import TrainingCallback
 
 
 @dataclass(frozen=True)
@@ -94,22 +95,22 @@ class ShortcutEvents:
         self.on_left_out = callback.on_left_out
 
     def on_progress(self, what: str, done: int, total: int) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self._events.print("progress", {"phase": what, "done": done, "total": total})
         self._callback.on_progress(what, done, total)
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self._events.print("ranked", {"candidates": [one.signature.name for one in ranked]})
         self._callback.on_ranked(ranked)
 
     def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self._events.print("learning", {"shortcut": name, "steps": total_steps})
         self._callback.on_learning(name, folder, total_steps)
 
     def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         length = after if isfinite(after) else None
         data = {"shortcut": name, "before": before, "after": length, "kept": kept}
         self._events.print("validated", data)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from slap_ros.api.planning import plan_task as make_plan
 from slap_ros.api.shortcut_choice import shortcuts_of_option
-from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.console import console, print_json, print_line, warn
 from slap_ros.core import Domain, Task
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import StorageFullError
@@ -96,7 +96,7 @@ def _plan_by_hand(
         )
     else:
         for name in names:
-            console.print(name)
+            print_line(name)
         console.print(
             f"{len(names)} operators, the fewest; they are the domain's hand-written ones, as "
             f"{domain.name} has no skills yet: steps are not predicted"
@@ -122,7 +122,7 @@ def _show(result: PlanningResult, json: bool) -> None:
         )
         return
     for option, steps in edges:
-        console.print(f"{steps:5d}  {option}")
+        print_line(f"{steps:5d}  {option}")
     if result.fails:
         console.print(f"this plan fails in the model, near the goal: {result.fails}")
     bound = "" if result.bound is None else f"; bound {bound_as_text(result.bound)}"
@@ -148,7 +148,6 @@ def _pddl(domain: Domain, operators: Sequence[LiftedOperator], task: Task) -> di
 def _write(folder: Path, files: Mapping[str, str]) -> None:
     """Write texts by file name."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
             write_whole(folder / name, text)
             console.print(f"wrote {folder / name}")

@@ -166,7 +166,6 @@ def _write(folder: Path, proposal: Proposal, problem: AcquisitionProblem) -> lis
         "proposal.json": proposal.to_json(),
     }
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
             write_whole(folder / name, text)
     except OSError as error:

@@ -39,7 +39,6 @@ def scene(
     scene_file, tag_file = tags / SCENE_FILE, tags / TAG_FILE
     chosen = get_domain(domain, preset)
     text = tagged_scene(chosen, task_with_goal(chosen, seed, index, "").initial_state)
-    tags.mkdir(parents=True, exist_ok=True)
     for path in (scene_file, tag_file):
         require_writable(path)
     write_whole(scene_file, text)

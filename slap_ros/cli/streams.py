@@ -1,11 +1,71 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The streams of a process that was started without them."""
+"""The standard streams of a command: stdout for data alone, and both where a process has none."""
 
 from __future__ import annotations
 
+import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from typing import TextIO
+
+
+class Stdout:
+    """Stdout, which can be kept for data."""
+
+    def __init__(self) -> None:
+        self._kept: TextIO | None = None  # while it is
+
+    def write_line(self, line: str) -> None:
+        """Write a line of data, at once.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+        stream = self._kept or sys.stdout
+        stream.write(f"{line}\n")
+        stream.flush()
+
+    @contextmanager
+    def kept_for_data(self) -> Iterator[None]:
+        """Send to stderr whatever else is printed on stdout meanwhile.
+
+        A domain's own code may print, as may libraries in C, and in any process that is started.
+        """
+        with _moved_descriptor(sys.stdout) as self._kept, redirect_stdout(sys.stderr):
+            try:
+                yield
+            finally:
+                self._kept = None
+
+
+@contextmanager
+def _moved_descriptor(stream: TextIO) -> Iterator[TextIO]:
+    """Another stream to the same place; the descriptor of the first becomes one of stderr.
+
+    Processes inherit descriptors, and code in C writes to them.
+
+    Args:
+        stream: Stdout; nothing is moved where it is in memory.
+    """
+    try:
+        number, stderr = stream.fileno(), sys.stderr.fileno()
+    except io.UnsupportedOperation:
+        yield stream
+        return
+    stream.flush()
+    kept = os.dup(number)
+    os.dup2(stderr, number)
+    try:
+        with os.fdopen(
+            kept, "w", encoding=stream.encoding, errors=stream.errors, closefd=False
+        ) as file:
+            yield file
+    finally:
+        os.dup2(kept, number)
+        os.close(kept)
 
 
 def open_closed_streams() -> None:

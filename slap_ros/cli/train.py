@@ -30,8 +30,9 @@ from slap_ros.cli.training_options import (
     new_library,
     setting_changes,
 )
+from slap_ros.shortcuts.candidate_groups import CandidateGroup
 from slap_ros.shortcuts.progress import latest
-from slap_ros.shortcuts.training import CandidateGroup, TrainingCallback
+from slap_ros.shortcuts.training_callback import TrainingCallback
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import SHIPPED
 
@@ -137,12 +138,12 @@ class _TrainingBars(LearningBars):
         super().__init__(BarColumn(), TimeRemainingColumn())
 
     def on_progress(self, what: str, done: int, total: int) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self.unfollow()
         super().on_progress(what, done, total)
 
     def on_left_out(self, use: str, index: int, reason: str) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         console.print(f"{use}: task {index} is left out, as it has no plan: {reason}")
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
@@ -156,7 +157,7 @@ class _TrainingBars(LearningBars):
             )
 
     def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         self.unfollow()
         bar = self.bars.add_task(f"learning {name}", total=total_steps, detail="")
         work = ShortcutWorkFolder(folder)
@@ -172,7 +173,7 @@ class _TrainingBars(LearningBars):
             self.bars.update(bar, completed=steps, detail=detail)
 
     def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
-        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
         console.print(
             f"{name}: plans of {before:.1f} steps become {after:.1f}{'' if kept else '; not kept'}",
         )

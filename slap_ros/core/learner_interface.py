@@ -11,7 +11,7 @@ import numpy as np
 
 from slap_ros.core.action_space import ActionSpace
 from slap_ros.core.world import MakeVectorWorld
-from slap_ros.relational import Column, GroundAtom, Object, Predicate, State
+from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, Predicate, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 
@@ -80,6 +80,10 @@ class LearnerInterface:
     grasping: frozenset[Predicate] = frozenset()
     length_m: float = 0.1
     frames: Callable[[State, Column], tuple[Array, Array]] | None = None
+
+    def grasp_atoms(self, space: AtomSpace) -> int:
+        """The ground atoms of a task about what is held, a mask."""
+        return space.mask(atom for atom in space.atoms if atom.predicate in self.grasping)
 
 
 SettingValue = bool | int | float | tuple[int, ...] | None  # None: a part that is left out

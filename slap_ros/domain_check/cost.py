@@ -13,7 +13,7 @@ from time import perf_counter
 from slap_ros.core import Domain
 from slap_ros.doctor.check import Check
 from slap_ros.domain_check.experience import Experience
-from slap_ros.shortcuts.settings import training_settings
+from slap_ros.shortcuts.named_settings import training_settings
 
 SLOW_IMPORT_S = 10.0  # the ensemble's nodes are waited for that long
 SLOW_STEPS = 100.0  # environment steps a second, below which training takes hours

@@ -13,8 +13,8 @@ from slap_ros.environments.mdp_env import MdpEnv
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
 from slap_ros.learning.work_folder import WorkFolder
-from slap_ros.shortcuts.explore import ExplorationResult
-from slap_ros.shortcuts.settings import training_settings
+from slap_ros.shortcuts.exploration_result import ExplorationResult
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Signature

@@ -118,7 +118,6 @@ class FolderChannel:
                     f"{path} has another question: the folder is another conversation's, or the "
                     "task was changed; choose another folder"
                 )
-            self._folder.mkdir(parents=True, exist_ok=True)
             write_whole(path, question)
         except (OSError, UnicodeDecodeError) as error:
             raise InvalidParameterError(f"cannot write {path}: {error}") from error

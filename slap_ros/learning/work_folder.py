@@ -61,7 +61,6 @@ class WorkFolder:
         path = self.path / f"{name}.json"
         if not path.exists():
             data = compute()
-            path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, json.dumps(data))
             return decode(data)
         try:

@@ -21,6 +21,7 @@ from slap_ros.messages.protocols import (
     StateMessage,
 )
 from slap_ros.relational import AtomSpace, GroundAtom, Layout, Object, State, Target, Type
+from slap_ros.relational.articles import a_or_an
 
 NANOSECONDS = 1_000_000_000  # in a second
 MORE_STEPS = 2.0**32  # than a message can say that a plan has
@@ -57,7 +58,7 @@ def _decode_object(msg: ObjectStateMessage, types: Mapping[str, Type]) -> Object
     obj = types[msg.type](msg.name)
     if len(msg.features) != len(obj.type.features):
         raise InvalidStateError(
-            f"{msg.name} is a {msg.type} with {len(obj.type.features)} features, "
+            f"{msg.name} is {a_or_an(msg.type)} with {len(obj.type.features)} features, "
             f"got {len(msg.features)}"
         )
     return obj
@@ -84,8 +85,8 @@ def decode_seen(msgs: Iterable[ObjectStateMessage], state: State) -> State:
         obj = state.layout.by_name.get(msg.name)
         if obj is None or (msg.type, len(msg.features)) != (obj.type.name, len(obj.type.features)):
             raise InvalidStateError(
-                f"{msg.name} was seen as a {msg.type} with {len(msg.features)} features, which the "
-                "state has not"
+                f"{msg.name} was seen as {a_or_an(msg.type)} with {len(msg.features)} features, "
+                "which the state has not"
             )
         if msg.name in named:
             raise InvalidStateError(f"{msg.name} was seen twice in one state")

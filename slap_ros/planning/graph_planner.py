@@ -10,12 +10,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
-from slap_ros.planning.abstract_graph import (
-    MAX_NODES,
-    AbstractGraph,
-    add_beyond,
-    build_abstract_graph,
-)
+from slap_ros.planning.abstract_graph import MAX_NODES, AbstractGraph, build_abstract_graph
+from slap_ros.planning.graph_beyond import add_beyond
 from slap_ros.planning.lazy_search import SearchLimits, search_lazily
 from slap_ros.planning.model import Model
 from slap_ros.planning.plan import PlanningResult
@@ -40,7 +36,7 @@ class GraphPlanner:
 
     Shortcuts are edges like others: one that fails in the model leads nowhere, and without any
     this is pure planning. One of which no edge is on a way to the goal may lead out of the graph
-    (:func:`~slap_ros.planning.abstract_graph.add_beyond`). Where no path can be executed, the
+    (:func:`~slap_ros.planning.graph_beyond.add_beyond`). Where no path can be executed, the
     graph is deepened beyond the paper's: by one layer at a time, up to ``max_extra_depth``.
 
     In the same graph, a plan with shortcuts is never longer in the model than one without; see

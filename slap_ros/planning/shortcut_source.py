@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from typing import Protocol
 
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.graph_beyond import EdgeBeyond
 from slap_ros.planning.landmark_cut import RelaxedOperator
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from slap_ros.errors import InvalidDomainError
+from slap_ros.relational.articles import a_or_an
 from slap_ros.relational.objects import Object, Type
 from slap_ros.relational.predicates import GroundAtom, Predicate
 
@@ -80,8 +81,8 @@ class LiftedOperator:
                     )
                 if not variable.type.is_a(wanted):
                     raise InvalidDomainError(
-                        f"operator {self.name}: {variable} in {atom} is a {variable.type}, "
-                        f"{atom.predicate.name} wants a {wanted}"
+                        f"operator {self.name}: {variable} in {atom} is "
+                        f"{a_or_an(variable.type)}, {atom.predicate.name} wants {a_or_an(wanted)}"
                     )
         for pair in self.inequalities:
             if pair[0] == pair[1] or not set(pair) <= set(self.parameters):

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.errors import InvalidDomainError, MismatchedAtomError
+from slap_ros.relational.articles import a_or_an
 from slap_ros.relational.metrics import Condition, typed_arguments, variable_names
 from slap_ros.relational.objects import Column, Object, Type
 from slap_ros.relational.state import Array, State
@@ -120,7 +121,7 @@ class Predicate:
         for obj, wanted in zip(objects, self.types, strict=True):
             if not obj.type.is_a(wanted):
                 raise MismatchedAtomError(
-                    f"{self.name} wants a {wanted}, but {obj.name} is a {obj.type}"
+                    f"{self.name} wants {a_or_an(wanted)}, but {obj.name} is {a_or_an(obj.type)}"
                 )
         return GroundAtom(self, objects)
 
@@ -137,8 +138,8 @@ def _check_arguments(name: str, types: tuple[Type, ...], condition: Condition) -
             )
         if not types[position].is_a(wanted):
             raise InvalidDomainError(
-                f"predicate {name}: {condition.metric.signature} wants a {wanted}, but object "
-                f"{position} is a {types[position]}"
+                f"predicate {name}: {condition.metric.signature} wants {a_or_an(wanted)}, but "
+                f"object {position} is {a_or_an(types[position])}"
             )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slap_ros.errors import InvalidStateError, UnknownObjectError
+from slap_ros.relational.articles import a_or_an
 from slap_ros.relational.objects import Column, Object, Type
 
 Array = NDArray[np.float64]
@@ -169,7 +170,7 @@ class State:
             wanted = [feature.name for feature in obj.type.features]
             if set(given) != set(wanted):
                 raise InvalidStateError(
-                    f"{obj.name} is a {obj.type} with features {wanted}, got {sorted(given)}"
+                    f"{obj.name} is {a_or_an(obj.type)} with features {wanted}, got {sorted(given)}"
                 )
             values.extend(float(given[name]) for name in wanted)
         state = cls(Layout.of(tuple(features)), values)

@@ -67,7 +67,6 @@ def write_page(path: Path, text: str) -> None:
         StorageFullError: It cannot be written; what was there before is left alone.
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, text)
     except OSError as error:
         raise StorageFullError(f"cannot write {path}: {error.strerror}") from error

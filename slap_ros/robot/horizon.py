@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from slap_ros.robot.blending import STANDS, MotionLimits, blend
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.limits import JointMotion
-from slap_ros.robot.robot_world import GripperAction, SafeCommand
+from slap_ros.robot.safe_command import SafeCommand
 
 
 @dataclass

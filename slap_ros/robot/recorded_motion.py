@@ -20,8 +20,8 @@ from slap_ros.errors import ControllerAbortedError, DamagedBagError, InvalidPara
 from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.relational import GroundAtom, Object, State
 from slap_ros.robot.grasp_tracking import GRASPED
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.limits import Joints, Limits
-from slap_ros.robot.robot_world import GripperAction
 from slap_ros.worlds.contact.arm import MAX_JOINT_STEP
 from slap_ros.worlds.contact.features import GRIPPER
 from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES

@@ -10,28 +10,23 @@ becomes a state only if that world accepts it, because the planner's model then 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import NamedTuple
-
-import numpy as np
 
 from slap_ros.core import Action, Domain
 from slap_ros.errors import (
     InvalidMeasurementError,
-    InvalidParameterError,
     InvalidStateError,
     NoDetectionError,
     NoJointStateError,
-    OpenLoopOnlyError,
     UnsafeCommandError,
 )
 from slap_ros.geometry.pose import Pose
 from slap_ros.perception.percept import known_part
 from slap_ros.relational import GroundAtom, Object, State
+from slap_ros.robot.detected_objects import DetectedObjects
 from slap_ros.robot.grasp_tracking import (
     GRASPED,
     expected_pose,
@@ -39,31 +34,19 @@ from slap_ros.robot.grasp_tracking import (
     is_lost,
     narrowest_width,
 )
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.hidden_objects import PredictedMotion, pushed_aside
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.known_scene import KnownScene
-from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Joints, Limits
-from slap_ros.robot.line_of_sight import Ways, is_slanted
+from slap_ros.robot.limits import Joints, Limits
+from slap_ros.robot.safe_command import SafeCommand
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.state_assembly import Grasp, feature_values
-from slap_ros.robot.tracking import (
-    LONGEST,
-    Detection,
-    PoseEstimate,
-    Track,
-    TrackingSettings,
-    measured_pose,
-    still,
-)
-from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
+from slap_ros.robot.tracking import PoseEstimate, Track, TrackingSettings, still
+from slap_ros.robot.usable_domains import require_panda
 from slap_ros.worlds.features import JOINT_FEATURES
-from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
-from slap_ros.worlds.joint_space.world import PandaWorld
-from slap_ros.worlds.panda import FINGER_OPEN
+from slap_ros.worlds.joint_space.features import GRASP_FEATURES
 
-GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
-GAP_SHUT = 0.0  # m
-FARTHEST = 10.0  # m, from the base; what is detected further away is in another unit
 PRESSED = 0.002  # m, by which what is held may be told to be inside a table: it cannot be
 HIGHEST = 0.03  # m, by which it is raised for that
 DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
@@ -74,23 +57,6 @@ class Doubt(NamedTuple):
 
     predicted: bool = False  # where the model has moved what is hidden
     seen: Object | None = None  # an object whose detections are not believed
-
-
-class GripperAction(Enum):
-    """What the gripper does before the arm moves."""
-
-    KEEP = "keep"
-    CLOSE = "close"
-    OPEN = "open"
-
-
-@dataclass(frozen=True)
-class SafeCommand:
-    """One command, within the arm's limits: first the gripper acts, then the arm moves."""
-
-    gripper: GripperAction
-    motion: JointMotion
-    after: State  # of the domain's own world, which took the same step
 
 
 @dataclass
@@ -115,16 +81,11 @@ class RobotWorld:
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
 
     def __post_init__(self) -> None:
-        _require_panda(self.domain, self.limits)
+        require_panda(self.domain, self.limits)
         self._scene = KnownScene.of(self.domain, self.scene_config.template)
-        self._tracks = {obj: Track(self.tracking) for obj in self.scene_config.detected}
+        self._detected = DetectedObjects(self.scene_config, self.tracking, self._in_hand)
+        self._tracks = self._detected.tracks
         self._left_out: frozenset[Object] = frozenset()  # of a task: no picture showed them
-        self._frames = {
-            how.frame: (obj, how)
-            for obj, frames in self.scene_config.detected.items()
-            for how in frames
-        }
-        self._pictures: deque[float] = deque(maxlen=LONGEST)  # stamps, each once
         self._reading: JointReading | None = None
         self._grasp: Grasp | None = None
         self._candidate: Grasp | None = None  # what the gripper is to close around
@@ -148,22 +109,7 @@ class RobotWorld:
             InvalidMeasurementError: Not finite, no pose, further away than anything a robot works
                 with, or not newer than the last one.
         """
-        if frame not in self._frames:
-            return
-        obj, how = self._frames[frame]
-        found, is_tag = measured_pose(*seen), how.tag_size is not None
-        pose = base.compose(found).compose(how.offset)
-        if math.hypot(*pose.position) > FARTHEST:
-            raise InvalidMeasurementError(
-                f"{obj.name} is detected {math.hypot(*pose.position):.6g} m away from the robot: "
-                "are positions in m?"
-            )
-        if not is_tag:
-            self._tracks[obj].add(Detection(stamp_s, pose, frame))
-        elif not is_slanted(found):
-            pose = self._likelier(obj, Ways.of(base, found, how.offset))
-            self._tracks[obj].add(Detection(stamp_s, pose, frame, base.position))
-        self.add_picture(stamp_s)
+        self._detected.add(frame, stamp_s, base, seen)
 
     def add_picture(self, stamp_s: float) -> None:
         """Take that a picture was searched: what none of several shows is hidden.
@@ -171,14 +117,14 @@ class RobotWorld:
         Args:
             stamp_s: Time at which it was taken, s.
         """
-        if not self._pictures or stamp_s > self._pictures[-1]:
-            self._pictures.append(stamp_s)
+        self._detected.add_picture(stamp_s)
 
-    def _likelier(self, obj: Object, ways: Ways) -> Pose:
-        grasp, last = self._grasp, self._tracks[obj].last_at_rest
-        if grasp is not None and grasp.obj == obj and self._reading is not None:
-            return ways.in_hand(expected_pose(grasp, self._reading))
-        return ways.at_rest(last.pose if last is not None else None)
+    def _in_hand(self, obj: Object) -> Pose | None:
+        """Where the hand has an object, if it holds it and anything was measured."""
+        grasp = self._grasp
+        if grasp is None or grasp.obj != obj or self._reading is None:
+            return None
+        return expected_pose(grasp, self._reading)
 
     def add_joint_reading(self, reading: JointReading) -> None:
         """Take joint positions.
@@ -221,7 +167,7 @@ class RobotWorld:
         """What was not detected since then, in words, and what to do about what is hidden."""
         missing = ", ".join(self.undetected(since_s)) or "none at all"
         never = ", ".join(self.undetected(-math.inf))
-        if not (self._pictures and never):
+        if not (self._detected.has_pictures and never):
             return missing
         return (
             f"{missing}; others are seen, but never yet {never}: move what is in front of it, or "
@@ -259,8 +205,8 @@ class RobotWorld:
         Raises:
             InvalidStateError: As :meth:`measure`.
         """
-        never = (obj for obj, track in self._tracks.items() if track.newest_s == -math.inf)
-        self._leave_out(obj for obj in never if self._is_hidden(self._tracks[obj], since_s))
+        never = self._detected.never_seen()
+        self._leave_out(obj for obj in never if self._is_hidden(obj, since_s))
         return self.measure(since_s, moving)
 
     def default_goal(self, state: State) -> frozenset[GroundAtom]:
@@ -355,7 +301,7 @@ class RobotWorld:
         reading = self._reading
         if reading is None or reading.stamp_s <= since_s or not reading.at_rest:
             return None
-        hidden = {o for o, t in self._followed if o == covered or self._is_hidden(t, since_s)}
+        hidden = {o for o, _ in self._followed if o == covered or self._is_hidden(o, since_s)}
         estimates = self._estimates(reading, since_s, hidden)
         held = self._grasp.obj if self._grasp is not None else None
         known = {o: s for o, s in estimates.items() if s is not None and o != held}
@@ -399,16 +345,8 @@ class RobotWorld:
             self._grasp, self._lost = None, True
         return estimates
 
-    def _is_hidden(self, track: Track, since_s: float) -> bool:
-        """Whether pictures since then, and since it was seen last, do not show it.
-
-        Where none of the last pictures shows anything, something covers the camera.
-        """
-        enough, unseen_s = self.tracking.hidden_after, max(since_s, track.newest_s)
-        newest_s = max(one.newest_s for one in self._tracks.values())
-        if not self._pictures or newest_s < self._pictures[0]:
-            return False
-        return 0 < enough <= sum(stamp_s > unseen_s for stamp_s in self._pictures)
+    def _is_hidden(self, obj: Object, since_s: float) -> bool:
+        return self._detected.is_hidden(obj, since_s, self.tracking.hidden_after)
 
     def _hidden(self, obj: Object, track: Track) -> PoseEstimate | None:
         """What is known of an object that pictures do not show: nothing, if they never did."""
@@ -520,44 +458,3 @@ class RobotWorld:
     def close(self) -> None:
         """Release the model's resources."""
         self._scene.model.close()
-
-
-def require_robot(domain: Domain, initial: State) -> None:
-    """Refuse a domain without a Panda before anything is started for it.
-
-    Raises:
-        InvalidParameterError: Its robot is another one, or its world is disturbed on purpose.
-        OpenLoopOnlyError: Its robot is a hand that acts by forces.
-    """
-    _require_closed_loop(domain)
-    if domain.make_model is not None:
-        raise InvalidParameterError(
-            f"{domain} has disturbances of its own, which only a simulation can have; use another "
-            "preset, or --world sim"
-        )
-    if ROBOT not in domain.types or not isinstance(domain.make_world(initial), PandaWorld):
-        raise InvalidParameterError(
-            f"{domain.name} has no Panda, which the robots here are; use --world sim"
-        )
-
-
-def _require_closed_loop(domain: Domain) -> None:
-    """Refuse a domain whose states a robot cannot measure."""
-    if HAND_OF_FORCES in domain.types:
-        raise OpenLoopOnlyError(
-            f"{domain.name} cannot run on a robot: its states have the target that the hand is "
-            "pulled to and the velocities of hand and fingers, which nothing measures; record a "
-            "run in simulation, then `slap bag replay BAG --to robot --dry-run` checks its motion"
-        )
-
-
-def _require_panda(domain: Domain, limits: Limits) -> None:
-    _require_closed_loop(domain)
-    if ROBOT not in domain.types:
-        raise InvalidParameterError(f"{domain.name} has no Panda, which a real robot is here")
-    reach, _ = domain.action_space.split(np.array(domain.action_space.high))
-    if any(a > b + STEP_TOLERANCE for a, b in zip(reach, limits.step, strict=True)):
-        raise InvalidParameterError(
-            f"preset {domain.preset} of {domain.name} lets joints jump by up to {max(reach):.2f} "
-            "rad in a step, which a real arm must not: use preset fair"
-        )

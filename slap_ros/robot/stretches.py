@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from slap_ros.robot.blending import STANDS, BlendedMotion, MotionLimits, blend
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.limits import JointMotion, Joints
 from slap_ros.robot.recorded_motion import RecordedWaypoint
-from slap_ros.robot.robot_world import GripperAction
 
 
 @dataclass(frozen=True)

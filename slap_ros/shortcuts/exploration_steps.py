@@ -11,7 +11,7 @@ from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import State
 from slap_ros.shortcuts.approaches import MOST_STEPS, sides_of
 from slap_ros.shortcuts.exploration_policies import PROBE_STEPS, within_reach
-from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 
 UNBATCHED_WORLDS = 4  # worlds where a domain's cannot be stepped together
 

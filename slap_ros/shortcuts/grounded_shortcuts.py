@@ -8,7 +8,8 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 
 from slap_ros.core import Domain
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.graph_beyond import EdgeBeyond
 from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.policies.learner_interface import learner_interface

@@ -23,12 +23,13 @@ from slap_ros.learning.task_range import TaskRange
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.demonstrations import demonstrate
-from slap_ros.shortcuts.explore import Explorer, OperatorPath
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts
 from slap_ros.shortcuts.sampling import Sampling
-from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_candidate import OperatorPath
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, find_start
 
@@ -52,7 +53,8 @@ def explore(
         kept: Shortcuts that are options like any other.
 
     Returns:
-        An :class:`~slap_ros.shortcuts.explore.ExplorationResult` as JSON, with ``cpu_s``.
+        JSON of an :class:`~slap_ros.shortcuts.exploration_result.ExplorationResult`, with
+        ``cpu_s``.
 
     Raises:
         UnsolvableError: The task has no plan.

@@ -225,7 +225,8 @@ class ObservationEncoder:
         self._kinds = self._of_kinds()
         self.action_map = make_action_map(domain, signature)
         self.robot_columns = _robot_columns(domain, space)
-        self._kept_grasp = 0 if uses_gripper(domain, signature) else self._grasp_atoms()
+        grasps = uses_gripper(domain, signature)
+        self._kept_grasp = 0 if grasps else self.interface.grasp_atoms(space)
 
     def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
         columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
@@ -315,11 +316,6 @@ class ObservationEncoder:
         if self.domain.exact:
             return Target.exactly(abstract)
         return Target(abstract, self.change.delete & ~abstract)
-
-    def _grasp_atoms(self) -> int:
-        """The atoms about what is held, a mask."""
-        grasping = self.interface.grasping
-        return self.space.mask(atom for atom in self.space.atoms if atom.predicate in grasping)
 
     def kept_grasp(self, state: State) -> int:
         """The atoms about what is held that must stay as they are, a mask.

@@ -148,6 +148,24 @@ class Signature:
     regrasps: bool = False
 
     @classmethod
+    def between(
+        cls, source: int, target: int, space: AtomSpace, grasping: Collection[Predicate]
+    ) -> Signature:
+        """Lift the change from an abstract state to another, with what is held in the first.
+
+        Args:
+            source: Abstract state in which a shortcut begins, a mask.
+            target: Abstract state that it leads to, a mask.
+            space: Atoms of the task.
+            grasping: Predicates about what is held.
+
+        Returns:
+            The signature, in which objects are roles.
+        """
+        change = Change.between(source, target)
+        return cls.of(change, space, context_of(source, grasping, space))
+
+    @classmethod
     def of(
         cls, change: Change, space: AtomSpace, context: frozenset[str] = frozenset()
     ) -> Signature:

@@ -11,25 +11,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.errors import SlapError
-from slap_ros.planning.abstract_graph import (
-    AbstractGraph,
-    Edge,
-    EdgeBeyond,
-    add_beyond,
-)
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.graph_beyond import EdgeBeyond, add_beyond
 from slap_ros.planning.options import Option, hold_option
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import AtomSpace, State
-from slap_ros.shortcuts.explore import OperatorPath
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
+from slap_ros.shortcuts.shortcut_candidate import OperatorPath
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
@@ -165,15 +160,11 @@ def _extend(
         standing: Option that stands for the shortcut, which is still to be learned.
     """
     leaving = [
-        EdgeBeyond(i, change.apply(node), partial(_made, standing))
+        EdgeBeyond.of(i, change.apply(node), standing)
         for i, node in enumerate(graph.nodes)
         for change in grounder.changes(node)
     ]
     add_beyond(graph, leaving, problem.operators)
-
-
-def _made(option: Option) -> Option:
-    return option
 
 
 def _shuffled(choices: Sequence[_Choice], rng: np.random.Generator) -> list[_Choice]:

@@ -19,7 +19,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
-from slap_ros.shortcuts.signature import Change, Signature, context_of
+from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 from slap_ros.shortcuts.straightening import ChainExecutor, StraightenedExecution, Straightener
 
@@ -108,14 +108,14 @@ class StraightenedChains:
 
     def _lifted(self, node: int, pair: Pair) -> tuple[Signature, Change]:
         """The change that two skills make from a node, and the signature that it has by itself."""
-        grasping = learner_interface(self._domain).grasping
+        interface = learner_interface(self._domain)
         before, between, after = (
             self._graph.nodes[i] for i in (node, pair[0].target, pair[1].target)
         )
-        change, context = Change.between(before, after), context_of(before, grasping, self._space)
-        signature = Signature.of(change, self._space, context)
+        change = Change.between(before, after)
+        signature = Signature.between(before, after, self._space, interface.grasping)
         if not self._regrasps:
             return signature, change
-        held = self._space.mask(atom for atom in self._space.atoms if atom.predicate in grasping)
+        held = interface.grasp_atoms(self._space)
         on_the_way = bool((before ^ between) & held) and not (before ^ after) & held
         return replace(signature, regrasps=on_the_way), change

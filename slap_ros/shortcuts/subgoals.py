@@ -17,6 +17,7 @@ import numpy as np
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.mlp_policy import MlpPolicy
+from slap_ros.shortcuts.candidate_groups import CandidateGroup, other_problems
 from slap_ros.shortcuts.hindsight_vec_env import HindsightEnvSpec
 from slap_ros.shortcuts.learning_attempt import LearningAttempt, learn_stages
 from slap_ros.shortcuts.progress import ProgressRecorder, SavableLearner
@@ -24,10 +25,11 @@ from slap_ros.shortcuts.settings import TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.shortcut_library import load_shortcut, save_shortcut
+from slap_ros.shortcuts.shortcut_record import with_origin
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.shortcuts.subgoal_vec_env import SubgoalEnvSpec
-from slap_ros.shortcuts.training import CandidateGroup, Training, other_problems, with_origin
+from slap_ros.shortcuts.training import Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 
@@ -185,7 +187,7 @@ class SubgoalTraining(Training):
             if group is None:
                 break
             ranked = other_problems(ranked, group)
-            if starts := self._starts(group, operator_steps):
+            if starts := self._steps.starts(group, operator_steps):
                 chosen[group] = starts
         if not chosen:
             return length

@@ -26,6 +26,7 @@ from slap_ros.relational import (
     State,
     Variable,
 )
+from slap_ros.relational.articles import a_or_an
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 from slap_ros.skills.groundings import GroundedStates, N
@@ -66,7 +67,8 @@ def _check_term(term: RewardTerm, operator: LiftedOperator) -> None:
             )
         if not variable.type.is_a(wanted):
             raise InvalidRewardError(
-                f"{where}: {variable} is a {variable.type}, but it is {term.metric.signature}"
+                f"{where}: {variable} is {a_or_an(variable.type)}, but it is "
+                f"{term.metric.signature}"
             )
 
 

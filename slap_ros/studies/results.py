@@ -152,7 +152,6 @@ def write(folder: Path, report: StudyReport, origin: Provenance, cpu_seconds: fl
         "svg": picture(report.draw, report.size),
         "md": _page(name, report, origin),
     }
-    folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for ending, content in contents.items():
         paths.append(folder / f"{name}.{ending}")

@@ -34,8 +34,8 @@ from slap_ros.relational import State
 from slap_ros.relational.pddl import parse_goal
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.library_choice import LibraryChoice
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.sampling import DEFAULT
-from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
 from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain

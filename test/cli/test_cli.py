@@ -230,6 +230,17 @@ def test_a_bag_is_never_overwritten(tmp_path):
     assert list((tmp_path / "bag").iterdir()) == []
 
 
+def test_a_bag_that_another_run_has_begun_meanwhile_is_not_called_this_ones(network, tmp_path):
+    """The recorder alone sees it: a link to nothing is no bag yet, and cannot be made one."""
+    bag = tmp_path / "bag"
+    bag.symlink_to("nowhere")
+    ran = slap_alone("run", "obstacle2d", "--record", bag, "--report", tmp_path / "run.html")
+    assert ran.returncode == 93, ran.stderr
+    assert "recorder_node ended: BAG_EXISTS" in ran.stderr
+    assert "bag: " not in ran.stderr
+    assert list(tmp_path.iterdir()) == [bag]
+
+
 @pytest.mark.parametrize(
     "command", [[], ["run"], ["evaluate"], ["plan"], ["bag"], ["report"], ["doctor"]]
 )

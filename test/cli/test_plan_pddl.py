@@ -91,6 +91,13 @@ def test_a_rover_sends_from_where_it_sampled(tmp_path: Path) -> None:
     assert found == {"plan": ["sample(r, hill)", "send(r, hill, hill, camp)"]}
 
 
+def test_a_plan_that_is_redirected_can_be_checked(tmp_path: Path) -> None:
+    result = invoke(tmp_path, PAIRS["survey"], "plan")
+    assert result.stdout == "sample(r, hill)\nsend(r, hill, hill, camp)\n"
+    check(World.read(*PAIRS["survey"]), read_steps(result.stdout))
+    assert result.stderr == "2 operators\n"
+
+
 def test_costs_are_minimised_and_said(tmp_path: Path) -> None:
     found = planned(tmp_path, PAIRS["haulage"])
     assert found["cost"] == 8

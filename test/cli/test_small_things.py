@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of a seed that nobody gave, other names of commands, and completion in a shell."""
+"""Seeds nobody gave, missing folders, other names of commands, and completion in a shell."""
 
 import json
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 
+BAG = Path(__file__).parent.parent / "bags" / "data" / "recorded_by_0.1.0"
 SEED_LINE = "seed 0 (the default; --seed N for another task)"
 
 
@@ -26,6 +28,22 @@ def test_a_seed_that_nobody_gave_is_said_beside_json(command, network):
     seconds = "planning_seconds"
     first, second = (json.loads(ran.stdout) | {seconds: 0} for ran in (without, with_seed))
     assert first == second
+
+
+@pytest.mark.parametrize(
+    ("command", "file"),
+    [
+        (["evaluate", "obstacle2d", "--tasks", "1", "--seeds", "1"], "trials.json"),
+        (["bag", "render", str(BAG)], "run.gif"),
+        (["report", str(BAG)], "run.html"),
+    ],
+    ids=["evaluate", "bag render", "report"],
+)
+def test_missing_folders_of_an_output_are_made(command, file, tmp_path):
+    output = tmp_path / "not" / "yet" / file
+    ran = slap(*command, "--output", str(output))
+    assert ran.exit_code == 0, ran.stderr
+    assert output.stat().st_size > 0
 
 
 def test_list_is_domains():

@@ -14,7 +14,7 @@ from slap_ros.errors import InvalidCommandError, InvalidParameterError, InvalidS
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionExecution, given_option
 from slap_ros.relational import State
-from slap_ros.robot.robot_world import require_robot
+from slap_ros.robot.usable_domains import require_robot
 
 FAIR = get_domain("obstacle_tower")
 STOCHASTIC = get_domain("obstacle_tower", "stochastic")

@@ -24,9 +24,10 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, OpenLoopOnlyError, UnsafeCommandError
 from slap_ros.report import read_report, render
 from slap_ros.robot.dry_run import DryRun
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.limits import Workspace, arm_limits
 from slap_ros.robot.recorded_motion import read_recorded_motion
-from slap_ros.robot.robot_world import GripperAction, RobotWorld
+from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.worlds.panda import grasp_pose

@@ -18,8 +18,9 @@ from slap_ros.errors import (
     InvalidParameterError,
     InvalidStateError,
 )
-from slap_ros.shortcuts.explore import ExplorationResult, ShortcutCandidate
+from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.shortcut_candidate import ShortcutCandidate
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from support.marks import slow

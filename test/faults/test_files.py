@@ -26,8 +26,9 @@ from slap_ros.meshes.solid import Solid
 from slap_ros.relational.pddl import write_domain, write_problem
 from slap_ros.report import read_report, render
 from slap_ros.robot.scene_config import read_scene_config
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.sampling import Sampling
-from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.training import Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder

@@ -147,6 +147,6 @@ def test_a_picture_that_shows_nothing_was_searched_if_the_robot_knows_the_camera
         item = transform(IDENTITY, SEARCHED)
         item.header = Header(stamp=sensors._node.get_clock().now().to_msg(), frame_id=camera)
         sensors._on_frames(TFMessage(transforms=[item]))
-        pictures.append(len(sensors._world._pictures))
+        pictures.append(len(sensors._world._detected._pictures))
     assert pictures == [0, 1]
     assert not sensors.counts["detections"]

@@ -9,7 +9,8 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning import abstract_graph
-from slap_ros.planning.abstract_graph import EdgeBeyond, add_beyond, build_abstract_graph
+from slap_ros.planning.abstract_graph import build_abstract_graph
+from slap_ros.planning.graph_beyond import EdgeBeyond, add_beyond
 from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import GroundOperator, LiftedOperator

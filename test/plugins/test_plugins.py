@@ -160,6 +160,35 @@ def test_a_domain_without_names_of_presets_has_one(install):
     assert run.exit_code == 0
 
 
+TALKS = """
+import os
+from dataclasses import replace
+from support import sweeping
+
+print("imported")
+
+def sample_task(rng):
+    print("sampled")
+    os.write(1, b"as code in C would\\n")
+    return sweeping.sample_task(rng)
+
+def make():
+    return replace(sweeping.make(), name="talks", sample_task=sample_task)
+"""
+
+
+def test_what_a_domain_prints_is_no_data(install):
+    """Neither here nor in processes that plan for it, which inherit stdout."""
+    install({"talks": "talks:make"}, talks=TALKS)
+    command = [sys.executable, "-m", "ensemble.cli", "evaluate", "talks", "--tasks", "1"]
+    command += ["--seeds", "2", "--jobs", "2", "--json"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=200)
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["domain"] == "talks"
+    for said in ("imported", "sampled", "as code in C would"):
+        assert said in run.stderr.splitlines()
+
+
 PRESETS = """
 from dataclasses import replace
 from slap_ros.core import presets

@@ -13,8 +13,9 @@ from slap_ros.learning.setting_changes import changed, parse_changes, setting_na
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.shortcuts.cloning_settings import ShortcutCloningSettings
+from slap_ros.shortcuts.named_settings import GENERAL, training_settings
 from slap_ros.shortcuts.sac_settings import ShortcutSacSettings
-from slap_ros.shortcuts.settings import GENERAL, OURS, TrainingSettings, training_settings
+from slap_ros.shortcuts.settings import OURS, TrainingSettings
 from slap_ros.shortcuts.stopping import Stopping
 from slap_ros.shortcuts.training import Training
 from slap_ros.skills.domain_choice import DomainChoice

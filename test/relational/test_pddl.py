@@ -569,6 +569,7 @@ PROBLEM_ERRORS = [
     ("(:domain d)", "", MalformedPddlError, "1:18: p needs one entry in :domain, found 0"),
     ("b c - block", "b c - cup", MalformedPddlError, "3:29: unknown type 'cup'; known here: block"),
     ("b c - block", "b B - block", MalformedPddlError, "3:25: two objects named 'B'"),
+    ("b c - block", "b ! - block", MalformedPddlError, "3:25: '!' cannot name an object in PDDL"),
     (
         "(:init (Free r))",
         "(:init (= (cost) 3))",

@@ -13,10 +13,10 @@ from slap_ros.robot.blended_run import BlendedRun
 from slap_ros.robot.blending import MotionLimits, blend
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.franka.limits import FRANKA, JERK, franka_limits
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.joint_trajectory import JointSpline
 from slap_ros.robot.limits import FR3, Workspace
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
-from slap_ros.robot.robot_world import GripperAction
 from slap_ros.worlds.panda import HOME, MAX_STEP
 
 PERIOD_S = 0.125

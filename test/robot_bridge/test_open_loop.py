@@ -12,8 +12,8 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ControllerAbortedError, InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import solve
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.recorded_motion import RecordedMotion
-from slap_ros.robot.robot_world import GripperAction
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 
 pytest.importorskip("pybullet")

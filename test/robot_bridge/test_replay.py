@@ -19,9 +19,9 @@ from slap_ros.bags.writer import BagWriter
 from slap_ros.errors import DamagedBagError, InvalidParameterError, UnsafeCommandError
 from slap_ros.messages.typestore import typestore
 from slap_ros.robot.dry_run import DryRun
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.limits import FR3, PANDA, Limits, Workspace
 from slap_ros.robot.recorded_motion import read_recorded_motion
-from slap_ros.robot.robot_world import GripperAction
 from slap_ros.skills.domain_choice import DomainChoice
 from support.slap_command import slap
 

@@ -21,9 +21,10 @@ from slap_ros.errors import (
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.motion import linear_motion, shifted
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
-from slap_ros.robot.robot_world import GripperAction, RobotWorld
+from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 from slap_ros.robot.state_assembly import possible_joints
 from slap_ros.robot.tracking import TrackingSettings

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the launch file's arguments, a user's parameter file and the shipped one say, in order."""
 
+import os
 import shutil
+import signal
 import subprocess
 import time
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 import yaml
@@ -61,6 +64,41 @@ def test_a_wrong_argument_starts_nothing(cli, argument, words):
     assert "process started" not in done.stdout + done.stderr
 
 
+@pytest.mark.parametrize("cause", ["killed", "refused"])
+def test_a_launch_says_that_its_recorder_has_ended_and_goes_on(cli, tmp_path, cause):
+    bag, output = tmp_path / "bag", tmp_path / "launch.txt"
+    if cause == "refused":
+        bag.mkdir()
+    with started([*LAUNCH, "domain:=obstacle2d", f"record:={bag}"], output) as launch:
+        wait_for_task()
+        if cause == "killed":
+            os.kill(process_of(launch, "recorder_node"), signal.SIGKILL)
+        wait_for_line(output, "NOTHING IS RECORDED from now on")
+        assert parameter("sim_node", "domain") == "obstacle2d"
+
+
+def test_a_recorder_that_ends_with_its_launch_is_not_missed(cli, tmp_path):
+    output = tmp_path / "launch.txt"
+    with started([*LAUNCH, "domain:=obstacle2d", f"record:={tmp_path / 'bag'}"], output):
+        wait_for_task()
+    assert "NOTHING IS RECORDED" not in output.read_text()
+
+
+def process_of(launch, name):
+    """The number of the process of a node that a launch has started."""
+    children = Path(f"/proc/{launch.pid}/task/{launch.pid}/children").read_text().split()
+    (found,) = (c for c in children if name in Path(f"/proc/{c}/cmdline").read_text())
+    return int(found)
+
+
+def wait_for_line(output, words):
+    """Return once a process has written these words."""
+    end = time.monotonic() + LIMIT
+    while words not in output.read_text():
+        assert time.monotonic() < end, output.read_text()
+        time.sleep(0.1)
+
+
 @pytest.mark.skipif(shutil.which("rviz2") is not None, reason="RViz is installed")
 def test_without_rviz_nothing_is_left_behind(cli):
     done = subprocess.run([*LAUNCH, "rviz:=true"], capture_output=True, text=True, timeout=LIMIT)
@@ -86,10 +124,7 @@ def test_a_simulated_fr3_is_launched_or_says_what_is_not_installed(cli, tmp_path
     launch = [*LAUNCH, "world:=franka-sim", "domain:=obstacle_tower", "speed:=0.2"]
     with started(launch, output):
         if find_spec("franky") is None or find_spec("franky_sim") is None:
-            end = time.monotonic() + LIMIT
-            while "[franka_driver-2]: process has died" not in output.read_text():
-                assert time.monotonic() < end
-                time.sleep(0.1)
+            wait_for_line(output, "[franka_driver-2]: process has died")
             assert "is not installed: " in output.read_text()
             return
         wait_for_task()  # which robot_bridge publishes once it has measured arm and objects

@@ -13,9 +13,11 @@ from slap_ros.domains.benchtop.state_access import hand_position, held_thing
 from slap_ros.domains.stack_at_target.scenery import CUBE_HALF
 from slap_ros.shortcuts.approaches import APPROACHED, MOST_STEPS, Approacher, sides_of
 from slap_ros.shortcuts.demonstrations import demonstrate
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.exploration_steps import usual_steps
-from slap_ros.shortcuts.explore import Explorer, ShortcutCandidate
-from slap_ros.shortcuts.settings import APPROACHES, ExplorationSettings, training_settings
+from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.named_settings import APPROACHES, training_settings
+from slap_ros.shortcuts.shortcut_candidate import ShortcutCandidate
 from slap_ros.shortcuts.starts import find_start, restore_starts
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 

@@ -7,8 +7,8 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidStateError
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.explore import Explorer
-from slap_ros.shortcuts.settings import ExplorationSettings
 
 
 def explore(nodes):
@@ -35,7 +35,7 @@ def test_where_the_world_can_begin_nothing_nothing_is_explored(monkeypatch):
     rng = np.random.default_rng(0)
     explorer = Explorer.of_task(get_domain("obstacle2d"), 1_000_000, 0, settings, rng)
     first, begun, refused = explorer.task.initial_state.key, [], []
-    reset = explorer._worlds.reset
+    reset = explorer._rollouts._worlds.reset
 
     def picky(world, state):
         if state.key != first:
@@ -44,7 +44,7 @@ def test_where_the_world_can_begin_nothing_nothing_is_explored(monkeypatch):
         begun.append(world)
         reset(world, state)
 
-    monkeypatch.setattr(explorer._worlds, "reset", picky)
+    monkeypatch.setattr(explorer._rollouts._worlds, "reset", picky)
     explorer.explore()
     assert begun
     assert len(set(refused)) == len(refused) == settings.nodes - 1

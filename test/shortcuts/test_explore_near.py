@@ -19,11 +19,12 @@ from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import Column, State
 from slap_ros.shortcuts import way_on
 from slap_ros.shortcuts.exploration_policies import PUSH, PushAim
-from slap_ros.shortcuts.explore import Explorer, ShortcutCandidate
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.rollout_origins import OptionRetracer
-from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.shortcut_candidate import ShortcutCandidate
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.starts import find_start, restore_starts

@@ -16,7 +16,8 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
-from slap_ros.shortcuts.settings import GENERAL, ExplorationSettings, training_settings
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.named_settings import GENERAL, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.shortcuts.training import Training

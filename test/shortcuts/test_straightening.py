@@ -16,9 +16,10 @@ from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.shortcuts.demonstrations import ShortcutDemonstration, demonstrate, demonstrated
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.named_settings import CHAINS, training_settings
 from slap_ros.shortcuts.observation_encoder import uses_gripper
-from slap_ros.shortcuts.settings import CHAINS, ExplorationSettings, training_settings
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 from slap_ros.shortcuts.starts import find_start

@@ -12,8 +12,9 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.hindsight_vec_env import HindsightEnvSpec
-from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.starts import StartRecord

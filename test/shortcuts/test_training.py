@@ -18,13 +18,18 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import SequentialWorkers, ray_workers
 from slap_ros.shortcuts import training
-from slap_ros.shortcuts.explore import ExplorationResult, ShortcutCandidate
+from slap_ros.shortcuts.candidate_groups import CandidateGroup, rank
+from slap_ros.shortcuts.exploration_result import ExplorationResult
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.progress import SNAPSHOTS, latest
-from slap_ros.shortcuts.settings import POLISH, ExplorationSettings, training_settings
+from slap_ros.shortcuts.settings import POLISH
+from slap_ros.shortcuts.shortcut_candidate import ShortcutCandidate
 from slap_ros.shortcuts.shortcut_library import load_library, load_shortcut, save_library
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.stopping import Stopping
-from slap_ros.shortcuts.training import CandidateGroup, Training, plans_name, rank
+from slap_ros.shortcuts.training import Training
+from slap_ros.shortcuts.training_steps import plans_name
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
 from support.programs import PATH, environment

@@ -3,6 +3,7 @@
 """The study of pruned candidates: which are, where they begin, and that learning them is real."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -10,8 +11,8 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.settings import training_settings
-from slap_ros.shortcuts.training import problem_key
+from slap_ros.shortcuts.candidate_groups import problem_key
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.slap.drawn_candidates import (
     LearningProblem,
@@ -72,11 +73,11 @@ def test_what_rollouts_join_can_be_learned_and_shortens_plans(explored):
         if key_of(one.candidate) == key_of(best)
     ]
     assert isinstance(problem, LearningProblem) and not problem.pruned
-    settings = SETTINGS.with_total_steps(60_000)
-    plain = {0: jobs.plan_length(TRAINING, 0, (), settings.sampling)}
+    settings = replace(SETTINGS, starts=50).with_total_steps(30_000)
+    plain = {i: jobs.plan_length(TRAINING, i, (), settings.sampling) for i in range(6)}
     steps = explored.explored.operator_steps
     learned = learn_candidate(TRAINING, problem.candidate, steps, settings, plain)
-    assert learned.success > 0.5 and learned.relative <= 1.0
+    assert learned.success > 0.5 and learned.relative < 1.0
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import pytest
 
 from slap_ros.errors import ErrorCode
 from slap_ros.skills.domain_choice import NO_SKILLS, DomainChoice, open_domain
-from slap_ros.studies.lg_sail.acquisition import learned_skills
+from slap_ros.studies.lg_sail.library_progress import learned_skills
 from slap_ros.studies.lg_sail.retrieval import Known, try_in_place
 from support.slap_command import slap
 

@@ -21,9 +21,9 @@ from slap_ros.files import pretty_json
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.exploration_result import ExplorationResult
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.sampling import Sampling
-from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shortcut_library import load_library, save_shortcut
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice

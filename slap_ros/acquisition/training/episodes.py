@@ -64,7 +64,6 @@ def save_episodes(path: Path, episodes: Episodes) -> None:
             ABOUT: np.frombuffer(about, dtype=np.uint8),
         }
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, content)
 
 

@@ -17,6 +17,7 @@ from slap_ros.errors import (
     MismatchedAtomError,
     SlapError,
 )
+from slap_ros.relational.articles import a_or_an
 from slap_ros.relational.objects import Object, Type
 from slap_ros.relational.operators import Variable
 from slap_ros.relational.pddl.names import Names
@@ -169,10 +170,11 @@ class Scope:
             )
         for term, kind in zip(terms, wanted, strict=True):
             if not _may_be(term, kind):
+                given, needed = a_or_an(term.type), a_or_an(kind)
                 raise self._mismatch(
                     word,
-                    f"{term} in {literal} is a {term.type}, {literal.predicate} wants a {kind}",
-                    f"{literal.predicate} wants a {kind}, but {term} is a {term.type}",
+                    f"{term} in {literal} is {given}, {literal.predicate} wants {needed}",
+                    f"{literal.predicate} wants {needed}, but {term} is {given}",
                 )
 
     def _mismatch(self, word: Word, of_operator: str, of_problem: str) -> SlapError:

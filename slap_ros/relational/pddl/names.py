@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Generic, TypeVar
 
 from slap_ros.errors import MalformedPddlError, SlapError
+from slap_ros.relational.articles import a_or_an
 from slap_ros.relational.pddl.sexpr import Word
 from slap_ros.relational.pddl.tokens import located
 
@@ -50,10 +51,11 @@ def check_name(kind: str, name: str) -> None:
     """
     if not _NAME.fullmatch(name):
         raise MalformedPddlError(
-            f"{name!r} cannot name a {kind} in PDDL: a letter, then letters, digits, '-' and '_'"
+            f"{name!r} cannot name {a_or_an(kind)} in PDDL: a letter, then letters, digits, '-' "
+            "and '_'"
         )
     if name.lower() in RESERVED:
-        raise MalformedPddlError(f"{name!r} cannot name a {kind}: PDDL reserves the word")
+        raise MalformedPddlError(f"{name!r} cannot name {a_or_an(kind)}: PDDL reserves the word")
 
 
 def check_free_name(kind: str, name: str) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from slap_ros.errors import MalformedPddlError
+from slap_ros.relational.articles import a_or_an
 from slap_ros.relational.pddl.names import OBJECT, bare_variable, check_words
 from slap_ros.relational.pddl.sexpr import ListNode, Node, Word, expect_word
 from slap_ros.relational.pddl.tokens import located
@@ -75,7 +76,7 @@ def _read(kind: str, nodes: Iterable[Node]) -> list[TypedName]:
     untyped = 0  # how many at the end of `found` wait for their type
     remaining = iter(nodes)
     for node in remaining:
-        word = expect_word(node, f"the name of a {kind}")
+        word = expect_word(node, f"the name of {a_or_an(kind)}")
         if word.text != "-":
             found.append(TypedName(word, (Word(OBJECT, word.position),)))
             untyped += 1

@@ -15,12 +15,13 @@ from dataclasses import dataclass, field
 from slap_ros.core import Action, Domain
 from slap_ros.errors import InvalidStateError, NoDetectionError
 from slap_ros.relational import GroundAtom, State
+from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Limits
 from slap_ros.robot.mujoco.arm import FINGER_FORCE, PERIOD_S
 from slap_ros.robot.mujoco.detectors import ExactDetector, ObjectDetector
 from slap_ros.robot.mujoco.plant_controllers import REACH, TOLERANCES, PlantControllers
-from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
+from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.robot.trajectory_tracking import TrajectoryTolerances
 

@@ -16,13 +16,13 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.geometry.pose import Vector, conjugate, dot, rotate
 from slap_ros.relational import State
 from slap_ros.robot.dry_run import DryRun
+from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.limits import PANDA, Limits
 from slap_ros.robot.mujoco.contact_state import measured_state
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.plant import PERIOD_S, MujocoPlant
 from slap_ros.robot.mujoco.plant_controllers import REACH, TOLERANCES, PlantControllers
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
-from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.features import pose_of

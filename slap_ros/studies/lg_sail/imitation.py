@@ -23,14 +23,6 @@ from slap_ros.imitation.unchecked_plans import UncheckedPlan, carry_out_unchecke
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.lg_sail.acquisition import (
-    LibrariesProgress,
-    LibraryProgress,
-    carry_out,
-    learned_skills,
-    of_library,
-    without_states,
-)
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,
     HandWrittenLibraries,
@@ -38,6 +30,14 @@ from slap_ros.studies.lg_sail.domain_choices import (
     all_goals,
     hand_written,
     shipped_skills,
+)
+from slap_ros.studies.lg_sail.library_progress import (
+    LibrariesProgress,
+    LibraryProgress,
+    carry_out,
+    learned_skills,
+    of_library,
+    without_states,
 )
 from slap_ros.studies.lg_sail.model_attempts import LanguageModel
 from slap_ros.studies.lg_sail.model_options import LanguageOptions, answered_by

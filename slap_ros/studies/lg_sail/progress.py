@@ -25,8 +25,6 @@ from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.skills.skill_library import read_library_record
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.lg_sail.acquisition import PAPER as LG_SAIL
-from slap_ros.studies.lg_sail.acquisition import of_library
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,
     LibraryTasks,
@@ -34,6 +32,7 @@ from slap_ros.studies.lg_sail.domain_choices import (
     all_goals,
     shipped_skills,
 )
+from slap_ros.studies.lg_sail.library_progress import PAPER_PROGRESS, of_library
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
@@ -157,7 +156,7 @@ class LearnerProgress:
     @property
     def paper(self) -> float | None:
         """LG-SAIL's task progress, where its Table 1 has one."""
-        known = {"sac": SAC, f"{OURS} (manual, manual)": LG_SAIL}.get(self.method, {})
+        known = {"sac": SAC, f"{OURS} (manual, manual)": PAPER_PROGRESS}.get(self.method, {})
         return known.get((self.domain, self.goal))
 
     def _over_trainings(self, spread: Spread, digits: int) -> str:

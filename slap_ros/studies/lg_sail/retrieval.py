@@ -24,7 +24,7 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill import LearnedSkill
 from slap_ros.skills.skill_signature import SkillSignature, signature_of
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.lg_sail.acquisition import learned_skills
+from slap_ros.studies.lg_sail.library_progress import learned_skills
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_whole

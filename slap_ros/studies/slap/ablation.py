@@ -27,13 +27,14 @@ from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs, learning_attempt
-from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.candidate_groups import rank
+from slap_ros.shortcuts.exploration_result import ExplorationResult, mean_operator_steps
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.sampling import Sampling
-from slap_ros.shortcuts.settings import OURS, TrainingSettings, training_settings
+from slap_ros.shortcuts.settings import OURS, TrainingSettings
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord
-from slap_ros.shortcuts.training import mean_steps, rank
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.figures import APPROACH_STYLES, LINES, label
 from slap_ros.studies.job_runner import JobRunner
@@ -252,7 +253,7 @@ def find_problem(setup: AblationSetup, seed: int) -> dict[str, Any]:
     tasks = range(settings.exploration.tasks)
     found = [jobs.try_to_explore(distribution, index, settings.exploration) for index in tasks]
     explored = [ExplorationResult.from_json(one) for one in found if not isinstance(one, str)]
-    operator_steps = mean_steps(explored)
+    operator_steps = mean_operator_steps(explored)
     for group in rank(explored) if explored else ():
         signature, path = group.signature, group.operator_path
         starts = [

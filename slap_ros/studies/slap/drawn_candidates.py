@@ -15,13 +15,15 @@ import numpy as np
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs as training_jobs
-from slap_ros.shortcuts.explore import ExplorationResult, Explorer, OperatorPath
+from slap_ros.shortcuts.candidate_groups import ProblemKey, problem_key
+from slap_ros.shortcuts.exploration_result import ExplorationResult
+from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.learning_attempt import LearningAttempt, learn
 from slap_ros.shortcuts.progress import latest
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
+from slap_ros.shortcuts.shortcut_candidate import OperatorPath
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, shortest_paths
-from slap_ros.shortcuts.training import ProblemKey, problem_key
 
 DRAWING = 20_000  # sets the random numbers that draw candidates apart from those of a training
 
@@ -109,8 +111,7 @@ def candidates_of_task(
         return str(error)
     explored = explorer.explore()
     drawn = _draw(explorer, most, np.random.default_rng([distribution.seed, DRAWING, index]))
-    enough = [pair for pair, hits in explorer.hits.items() if hits >= settings.exploration.hits]
-    joined = {(one := explorer.signature(*pair)).name: one for pair in enough}
+    joined = {one.signature.name: one.signature for one in explorer.shown}
     return TaskCandidates(explored, tuple(drawn), tuple(joined.values())).as_json()
 
 

@@ -29,7 +29,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_each
-from slap_ros.studies.slap.table1 import (
+from slap_ros.studies.slap.library_rows import (
     PURELY,
     PlannedWay,
     Row,

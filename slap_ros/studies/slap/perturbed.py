@@ -12,6 +12,7 @@ from slap_ros.api.command_options import CommandOption
 from slap_ros.api.left_out import Tell
 from slap_ros.domains import get_domain
 from slap_ros.studies.slap import robustness
+from slap_ros.studies.slap.library_rows import open_library
 from slap_ros.studies.slap.robustness import (
     TABLE,
     PapersRow,
@@ -21,7 +22,6 @@ from slap_ros.studies.slap.robustness import (
     renamed_way,
     summary,
 )
-from slap_ros.studies.slap.table1 import open_library
 from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
 
 TRAINED = "slap_trained_perturbed"  # the approach with libraries that were trained in such worlds

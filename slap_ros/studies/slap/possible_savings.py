@@ -19,10 +19,12 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.shortcuts import jobs as training_jobs
-from slap_ros.shortcuts.explore import ExplorationResult, Explorer
+from slap_ros.shortcuts.candidate_groups import ProblemKey, problem_key
+from slap_ros.shortcuts.exploration_result import ExplorationResult
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.named_settings import NEAR, training_settings
 from slap_ros.shortcuts.saving_bounds import Operators, SavingBound, saving_bounds
-from slap_ros.shortcuts.settings import NEAR, ExplorationSettings, training_settings
-from slap_ros.shortcuts.training import ProblemKey, problem_key
 from slap_ros.shortcuts.way_on import steps_to_goal
 from slap_ros.skills.domain_choice import DEMONSTRATOR, SHIPPED, DomainChoice
 from slap_ros.studies.job_runner import JobRunner

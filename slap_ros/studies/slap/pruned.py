@@ -15,8 +15,9 @@ from slap_ros.drawing.palette import MUTED, PLAN, SHORTCUT
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.shortcuts import jobs as training_jobs
-from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings, training_settings
-from slap_ros.shortcuts.training import mean_steps
+from slap_ros.shortcuts.exploration_result import mean_operator_steps
+from slap_ros.shortcuts.named_settings import training_settings
+from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.job_runner import JobRunner
@@ -204,7 +205,7 @@ def _learn(
     runner: JobRunner,
 ) -> list[PrunedRow]:
     """Learn each of them once."""
-    operator_steps = mean_steps([task.explored for task in explored])
+    operator_steps = mean_operator_steps([task.explored for task in explored])
     results = runner.run(
         "learning",
         learn_candidate,

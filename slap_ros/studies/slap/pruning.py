@@ -18,10 +18,11 @@ from slap_ros.evaluation.experiment import Trial
 from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs as training_jobs
-from slap_ros.shortcuts.explore import ExplorationResult
-from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
+from slap_ros.shortcuts.candidate_groups import problem_key
+from slap_ros.shortcuts.exploration_result import ExplorationResult
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.shortcut import Shortcut
-from slap_ros.shortcuts.training import problem_key
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import Comparison
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions

@@ -26,7 +26,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval, plot_whole
-from slap_ros.studies.slap.table1 import Row, relative_cell
+from slap_ros.studies.slap.library_rows import Row, relative_cell
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 from slap_ros.studies.trained_baselines import BASELINES, baselines_in_runs, open_baselines
 

@@ -36,7 +36,7 @@ from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, 
 from slap_ros.studies.replanned_trials import ReplannedTrials
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval
-from slap_ros.studies.slap.table1 import (
+from slap_ros.studies.slap.library_rows import (
     PURELY,
     PlannedWay,
     Row,

@@ -14,8 +14,8 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
 from slap_ros.learning.json_lines import decoded_lines
 from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
-from slap_ros.shortcuts.explore import ExplorationResult
-from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.exploration_result import ExplorationResult
+from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_shortcut
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
