@@ -15,7 +15,7 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, InvalidSceneError
 from slap_ros.geometry.pose import ORIGIN, Pose, Vector
 from slap_ros.relational import State
-from slap_ros.robot.mujoco.arm import BODY_CONTACTS, SOLIMP, SOLREF, arm_spec
+from slap_ros.robot.mujoco.arm import BODY_CONTACTS, SOLIMP, SOLREF, ArmMotors, arm_spec
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.placed_scene import PandaScene, PlacedBody, PlacedScene
 from slap_ros.worlds.bodies import Colour, Material, RigidBody
@@ -41,7 +41,7 @@ def scene_around(domain: Domain, state: State) -> PandaScene:
         return world.scene
 
 
-def scene_spec(scene: PandaScene, state: State) -> Any:
+def scene_spec(scene: PandaScene, state: State, motors: ArmMotors | None = None) -> Any:
     """The model as a ``mujoco.MjSpec`` that is not compiled yet: cameras, say, can be added.
 
     Each body of the scene is a body of its name in the model.
@@ -49,12 +49,13 @@ def scene_spec(scene: PandaScene, state: State) -> Any:
     Args:
         scene: Bodies of the scene, and their shapes.
         state: Where they are, and what they are made of.
+        motors: How hard the arm's joints are held.
 
     Raises:
         InvalidSceneError: MuJoCo cannot express a body; says which, and why.
         InvalidStateError: The state does not have the scene's bodies.
     """
-    spec = arm_spec()
+    spec = arm_spec(motors)
     for placed in PlacedScene.of(scene, state).bodies:
         _add(spec, placed)
     return spec

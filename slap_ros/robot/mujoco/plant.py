@@ -99,6 +99,19 @@ class MujocoPlant:
         return [float(v) for v in self._data.qvel[self._arm_speeds]]
 
     @property
+    def fingers(self) -> tuple[float, float]:
+        """Distance of the left and of the right finger from the middle, m, as far as they go."""
+        found = self._data.qpos[self._fingers_at].tolist()
+        left, right = (min(max(at, FINGER_CLOSED), FINGER_OPEN) for at in found)
+        return (left, right)
+
+    @property
+    def finger_velocities(self) -> tuple[float, float]:
+        """How fast the left and the right finger open, m/s."""
+        left, right = self._data.qvel[self._finger_speeds].tolist()
+        return (left, right)
+
+    @property
     def gap(self) -> float:
         """Distance between the fingers, m."""
         return float(sum(self._data.qpos[self._fingers_at]))
