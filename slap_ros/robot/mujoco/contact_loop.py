@@ -20,7 +20,7 @@ from slap_ros.robot.mujoco.arm import PERIOD_S, ArmMotors
 from slap_ros.robot.mujoco.contact_state import measured_state
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.plant import MujocoPlant
-from slap_ros.robot.mujoco.plant_controllers import UNCHECKED, PlantControllers
+from slap_ros.robot.mujoco.plant_controllers import REACH, UNCHECKED, PlantControllers
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.servoing import HandServo
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
@@ -50,7 +50,7 @@ class ContactLoopWorld:
                 f"the hand of {domain.name} has no forces: its robot in MuJoCo is ClosedLoopWorld"
             )
         self._scene = scene
-        self._servo = HandServo(ContactIndex.of(scene, initial.layout), initial)
+        self._servo = HandServo(ContactIndex.of(scene, initial.layout), initial, REACH)
         self.plant = MujocoPlant(compiled(scene_spec(scene, initial, motors)), scene, initial)
         self._controllers = PlantControllers(self.plant, UNCHECKED, scene.forces.grip_n)
         self._state = self._measured(initial)
