@@ -70,7 +70,13 @@ from ensemble.steady_time import JumpFreeClock, create_timer
 from robot_bridge.sensors import Sensors
 from robot_bridge.servo.controllers import ServoControllers
 from slap_ros.core import Action, Task
-from slap_ros.errors import InvalidStateError, NoDetectionError, NoJointStateError, SlapError
+from slap_ros.errors import (
+    BusyError,
+    InvalidStateError,
+    NoDetectionError,
+    NoJointStateError,
+    SlapError,
+)
 from slap_ros.messages.decode import decode_goal
 from slap_ros.relational import GroundAtom, State
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction
@@ -78,6 +84,8 @@ from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.robot.servoed_robot import ServoedRobot
 
 POLL_PERIOD = 0.005  # s, between two looks at what is measured
+# What keeps a task from being begun, as long as it lasts.
+UNSTARTED = (BusyError, InvalidStateError, NoDetectionError, NoJointStateError)
 REPORT_PERIOD_S = 1.0  # between two reports of why there is no task yet
 
 
@@ -234,7 +242,7 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
     def _start(self) -> None:
         try:
             self._begin(self._measured_first())
-        except (InvalidStateError, NoDetectionError, NoJointStateError) as error:
+        except UNSTARTED as error:
             now_s = self._robot_clock.now_s()
             waited = now_s - self._since_s > self._settings.detection_timeout
             if waited and now_s - self._reported_s >= REPORT_PERIOD_S:
@@ -246,11 +254,14 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
         """The state in which an episode begins.
 
         Raises:
-            SlapError: There is none: something is not measured, moves, or cannot be.
+            SlapError: There is none: the arm moves, or something is not measured or cannot be.
         """
-        state = self._robot.begin(self._since_s)
+        if self._robot.arm_moves:
+            raise BusyError("the arm moves: cancel the task first, or try again once it stands")
+        since_s = self._robot_clock.now_s() - self._settings.detection_timeout
+        state = self._robot.begin(since_s)
         if state is None:
-            raise self._unmeasured(self._since_s)
+            raise self._unmeasured(since_s)
         return state
 
     def _reset(self, request: ResetTask.Request) -> None:

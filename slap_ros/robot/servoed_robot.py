@@ -38,11 +38,12 @@ from slap_ros.worlds.contact.snapshot import ContactIndex
 from slap_ros.worlds.contact.validation import GRASP_GAP
 from slap_ros.worlds.contact.world import ContactWorld
 from slap_ros.worlds.layout_index import BodyState
-from slap_ros.worlds.panda import grasp_pose
+from slap_ros.worlds.panda import FINGER_OPEN, grasp_pose
 from slap_ros.worlds.validation import share_space
 
 REMEMBERED = 256  # joint readings, for where the hand was when something was detected
 STANDING = 0.005  # m/s, of each finger: slower ones press, or are at their end
+STOPPED = 0.005  # m, from its end, of a finger that was told to close
 RATE_S = 0.02  # s, over which the fingers' velocity is taken
 
 
@@ -168,6 +169,11 @@ class ServoedRobot:
         """Stamp of the newest joint positions; minus infinity without any."""
         return self._readings[-1].stamp_s / self._pace if self._readings else -math.inf
 
+    @property
+    def arm_moves(self) -> bool:
+        """Whether the arm moved when its joints were measured last."""
+        return bool(self._readings) and not self._readings[-1].at_rest
+
     def undetected(self, since_s: float) -> list[str]:
         """Names of the objects that were not detected since a time, s."""
         return [o.name for o, t in self._tracks.items() if t.newest_s <= since_s * self._pace]
@@ -186,10 +192,12 @@ class ServoedRobot:
         Raises:
             InvalidStateError: What is measured cannot be.
         """
-        if self.undetected(since_s) or not self._readings or not self._readings[-1].at_rest:
+        if self.undetected(since_s) or not self._readings or self.arm_moves:
             return None
-        self._servo = None
-        state = self.measure(since_s)
+        newest = self._readings[-1]
+        closing = newest.gap is not None and 0.5 * newest.gap < FINGER_OPEN - STOPPED
+        stay = HandCommand.to_stay(grasp_pose(possible_joints(newest.joints)), closing)
+        state = self._assembled(since_s, stay)
         if state is not None:
             self._servo = HandServo(self._index, state, self._workspace)
         return state
@@ -201,14 +209,17 @@ class ServoedRobot:
             since_s: Time since which joints are to be measured, s.
 
         Returns:
-            The state; None while measurements are missing.
+            The state; None while measurements are missing, or no task has begun.
 
         Raises:
             InvalidStateError: What is measured cannot be.
         """
+        return None if self._servo is None else self._assembled(since_s, self._servo.command)
+
+    def _assembled(self, since_s: float, told: HandCommand) -> State | None:
         if self.newest_joints_s <= since_s or len(self._readings) < 2:
             return None
-        hand, joints = self._hand()
+        hand, joints = self._hand(told)
         motions = [self._motion(body.name) for body in self._model.scene.free]
         bodies = tuple(motion for motion in motions if motion is not None)
         if len(bodies) < len(motions):
@@ -223,7 +234,7 @@ class ServoedRobot:
         self._model.reset(state)
         return state
 
-    def _hand(self) -> tuple[HandState, Joints]:
+    def _hand(self, told: HandCommand) -> tuple[HandState, Joints]:
         """The hand and the joints of the newest reading."""
         newest, earlier = self._readings[-1], self._reading_at(self._readings[-1].stamp_s - RATE_S)
         if newest.gap is None or earlier.gap is None:
@@ -234,14 +245,8 @@ class ServoedRobot:
         rates = newest.velocities or tuple(
             (b - a) / passed_s for a, b in zip(earlier.joints, newest.joints, strict=True)
         )
-        hand = moving_hand(joints, rates, (finger, finger), (opening, opening), self._told(joints))
+        hand = moving_hand(joints, rates, (finger, finger), (opening, opening), told)
         return hand, joints
-
-    def _told(self, joints: Joints) -> HandCommand:
-        """What the hand was told last; before anything, to stay."""
-        if self._servo is not None:
-            return self._servo.command
-        return HandCommand.to_stay(grasp_pose(joints), closing=False)
 
     def _reading_at(self, stamp_s: float) -> JointReading:
         """The last reading before a time, or else the first that is known, never the newest."""
