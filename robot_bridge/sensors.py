@@ -39,7 +39,14 @@ class MeasuredRobot(Protocol):
         ...
 
     def add_detection(self, frame: str, stamp_s: float, base: Pose, seen: Pose) -> None:
-        """Take where a frame is detected."""
+        """Take where a frame is detected.
+
+        Args:
+            frame: Name of the child frame.
+            stamp_s: Time of the measurement, s.
+            base: Pose of the parent frame in the base's frame.
+            seen: Pose of the child frame in its parent.
+        """
         ...
 
     def add_picture(self, stamp_s: float) -> None:

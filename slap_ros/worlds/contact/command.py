@@ -73,6 +73,9 @@ def commanded(hand: HandState, joints: Joints, action: Action) -> CommandedHand:
         hand: Hand at the beginning of a control period.
         joints: Joint positions of the arm then, rad.
         action: Action of the contact world's space.
+
+    Returns:
+        The hand with its new target, and how far the arm can go there.
     """
     told = _told(hand, action.tolist())
     goal = arm_joints(told.target_pose)
