@@ -23,6 +23,7 @@ from slap_ros.worlds.panda import JOINTS
 
 # As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
 TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
+BRIDGES = frozenset({"robot_bridge", "servo_bridge"})  # names of nodes that command an arm
 TRAJECTORY_TOPIC = "ARM_arm_controller/joint_trajectory"
 GRIPPER_ACTION = "franka_gripper/gripper_action"
 # Of the bridge to a robot in MuJoCo, where tables, which are as high as domains want, stop the arm.

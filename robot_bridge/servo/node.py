@@ -69,8 +69,10 @@ from ensemble.robot_parameters import ServoBridgeParameters, action_name, arm_jo
 from ensemble.steady_time import JumpFreeClock, create_timer
 from robot_bridge.sensors import Sensors
 from robot_bridge.servo.controllers import ServoControllers
+from robot_bridge.sole_bridge import require_alone
 from slap_ros.core import Action, Task
 from slap_ros.errors import (
+    AlreadyRunningError,
     BusyError,
     InvalidStateError,
     NoDetectionError,
@@ -85,7 +87,13 @@ from slap_ros.robot.servoed_robot import ServoedRobot
 
 POLL_PERIOD = 0.005  # s, between two looks at what is measured
 # What keeps a task from being begun, as long as it lasts.
-UNSTARTED = (BusyError, InvalidStateError, NoDetectionError, NoJointStateError)
+UNSTARTED = (
+    AlreadyRunningError,
+    BusyError,
+    InvalidStateError,
+    NoDetectionError,
+    NoJointStateError,
+)
 REPORT_PERIOD_S = 1.0  # between two reports of why there is no task yet
 
 
@@ -241,7 +249,9 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
 
     def _start(self) -> None:
         try:
-            self._begin(self._measured_first())
+            state = self._measured_first()
+            require_alone(self)
+            self._begin(state)
         except UNSTARTED as error:
             now_s = self._robot_clock.now_s()
             waited = now_s - self._since_s > self._settings.detection_timeout

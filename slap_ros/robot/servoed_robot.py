@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from contextlib import suppress
 from dataclasses import replace
 
 from slap_ros.core import Action, Domain
@@ -123,6 +124,7 @@ class ServoedRobot:
         }
         self._readings: deque[JointReading] = deque(maxlen=REMEMBERED)
         self._servo: HandServo | None = None
+        self._state: State | None = None  # measured last
 
     # -- measurements ---------------------------------------------------------------------------
 
@@ -232,6 +234,7 @@ class ServoedRobot:
             self._template, snapshot._replace(joints=joints, hand=hand, bodies=bodies, held=held)
         )
         self._model.reset(state)
+        self._state = state
         return state
 
     def _hand(self, told: HandCommand) -> tuple[HandState, Joints]:
@@ -294,12 +297,13 @@ class ServoedRobot:
         Raises:
             InvalidCommandError: The action is not in the action space.
             UnsafeCommandError: The fingertips would leave the workspace.
-            InvalidStateError: No task has begun, or what is measured cannot be.
+            InvalidStateError: No task has begun.
         """
-        state = self.measure(-math.inf)
-        if self._servo is None or state is None:
+        with suppress(InvalidStateError):  # then from where it was when a state was measured last
+            self.measure(-math.inf)
+        if self._servo is None or self._state is None:
             raise InvalidStateError("nothing is measured yet")
-        return self._servo.act(state, action)
+        return self._servo.act(self._state, action)
 
     def close(self) -> None:
         """Release the model's resources."""

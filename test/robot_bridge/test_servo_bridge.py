@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bridge at a bench: commands that replace one another, on the robot in MuJoCo."""
 
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
@@ -93,7 +94,7 @@ class ServoLab(Bench):
 
 
 @contextmanager
-def lab(robot=None, bridge=None):
+def lab(robot=None, bridge=None, beside=""):
     nodes = node_parameters(settings(robot, bridge))
     only = {name: nodes[name] for name in ("robot_bridge.mujoco", "robot_bridge.servo")}
     heard = []
@@ -102,8 +103,11 @@ def lab(robot=None, bridge=None):
             client,
             spinner,
         ),
-        InProcessLauncher(only, spinner.executor),
+        ExitStack() as stack,
     ):
+        if beside:
+            stack.callback(rclpy.create_node(beside).destroy_node)
+        stack.enter_context(InProcessLauncher(only, spinner.executor))
         yield ServoLab(client, spinner, heard)
 
 
@@ -180,3 +184,11 @@ def test_what_a_run_at_a_bench_cannot_have_is_refused_before_it_begins(arguments
     done = slap("run", *arguments, "--world", "mujoco", "--skills", DEMONSTRATOR)
     assert done.exit_code == code
     assert said in " ".join(done.stderr.split())
+
+
+def test_beside_another_bridge_nothing_begins(network):
+    with lab(bridge={"detection_timeout": 1.0}, beside="robot_bridge") as bench:
+        bench.until(lambda: bench.faults)
+        assert bench.faults[0].error_code == ErrorCode.ALREADY_RUNNING
+        assert "another robot_bridge" in bench.faults[0].error_msg
+        assert not bench.states
