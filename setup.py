@@ -202,6 +202,7 @@ setup(
         "console_scripts": [
             "slap = ensemble.cli:main",
             *(f"{node} = {node}.__main__:main" for node in NODES),
+            "servo_bridge = robot_bridge.servo.__main__:main",
             "mock_robot = robot_bridge.mock.__main__:main",
             "mujoco_robot = robot_bridge.mujoco.__main__:main",
             "franka_driver = robot_bridge.franka.__main__:main",

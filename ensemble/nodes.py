@@ -11,7 +11,7 @@ from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Any
 
-from ensemble.robot_parameters import BEFORE_MUJOCO
+from ensemble.robot_parameters import BEFORE_MUJOCO, BEFORE_MUJOCO_AT_A_BENCH
 from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, MUJOCO, SIM
 from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.skills.domain_choice import DomainChoice
@@ -20,6 +20,7 @@ from slap_ros.skills.domain_choice import DomainChoice
 NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as a process
     "sim_node": "sim_node.node:SimNode",
     "robot_bridge": "robot_bridge.node:RobotBridge",
+    "robot_bridge.servo": "robot_bridge.servo.node:ServoBridge",
     "robot_bridge.mock": "robot_bridge.mock.node:MockRobot",
     "robot_bridge.mujoco": "robot_bridge.mujoco.node:MujocoRobot",
     "robot_bridge.franka": "robot_bridge.franka.node:FrankaDriver",
@@ -77,6 +78,7 @@ class RunSettings:
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
     patience: float = 1.0  # factor of all deadlines
     world: str = SIM  # the simulator, a robot, or the bridge with a simulated robot behind it
+    servo: bool = False  # whether the robot is commanded while it moves: in the contact world
     scene: str = ""  # a robot's scene file; empty: the objects of the sampled task
     # Parameters of the simulated robots, of the bridge, of a Franka arm's driver and of perception
     # that are not the default.
@@ -153,6 +155,10 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
         return {"robot_bridge.franka": task | dict(settings.franka) | simulated} | bridge
     if settings.world == MOCK:
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
+    if settings.servo:
+        passing = {"pace": settings.mujoco.get("pace", 1.0)}
+        servo = task | dict(BEFORE_MUJOCO_AT_A_BENCH) | passing | dict(settings.bridge)
+        return {"robot_bridge.mujoco": task | dict(settings.mujoco), "robot_bridge.servo": servo}
     if settings.world == MUJOCO:
         camera = bool(settings.mujoco.get("camera"))
         before = dict(BEFORE_MUJOCO) | (BEFORE_CAMERA if camera else {})

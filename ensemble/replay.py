@@ -12,7 +12,7 @@ from typing import Protocol
 
 from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import node_class
-from ensemble.robot_parameters import PlayerParameters
+from ensemble.robot_parameters import BRIDGES, PlayerParameters
 from ensemble.run import CANCEL_TIMEOUT, DISCOVERY
 from ensemble.spinner import Spinner, temporary_node
 from slap_ros.errors import AlreadyRunningError, InvalidParameterError, SlapError
@@ -20,7 +20,7 @@ from slap_ros.relational import State
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.recorded_motion import RecordedMotion
 
-BRIDGE, PLAYER = "robot_bridge", "robot_bridge.player"
+PLAYER = "robot_bridge.player"
 MOCK_ROBOT, FRANKA_DRIVER = "robot_bridge.mock", "robot_bridge.franka"
 
 
@@ -118,7 +118,7 @@ def replay_on_robot(
     ):
         player: MotionPlayer = made[0]
         spinner = made[1]
-        if spinner.spin_until(lambda: BRIDGE in player.get_node_names(), DISCOVERY):
+        if spinner.spin_until(lambda: not BRIDGES.isdisjoint(player.get_node_names()), DISCOVERY):
             raise AlreadyRunningError("a robot_bridge commands this robot: stop it first")
         if driver is not None:
             task = _sampled_task(recorded) if driver.simulates else {}

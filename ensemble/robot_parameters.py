@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
@@ -18,17 +18,25 @@ from slap_ros.robot.franka.limits import JERK, franka_limits
 from slap_ros.robot.limits import FR3, Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.skills.domain_choice import DomainChoice
+from slap_ros.worlds.contact.scene import HandForces
 from slap_ros.worlds.panda import JOINTS
 
 # As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
 TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
+BRIDGES = frozenset({"robot_bridge", "servo_bridge"})  # names of nodes that command an arm
+TRAJECTORY_TOPIC = "ARM_arm_controller/joint_trajectory"
 GRIPPER_ACTION = "franka_gripper/gripper_action"
 # Of the bridge to a robot in MuJoCo, where tables, which are as high as domains want, stop the arm.
 BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
     {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 70.0}
 )
+# At a bench fingers press as hard as those of the contact world.
+BEFORE_MUJOCO_AT_A_BENCH = MappingProxyType(
+    {**BEFORE_MUJOCO, "gripper_effort": HandForces().grip_n}
+)
 Parameters = Mapping[str, str | int | float | tuple[float, ...]]
 WORKSPACE = (*Workspace().low, *Workspace().high)
+BENCH = (0.2, -0.5, 0.0, 0.8, 0.5, 0.9)  # m: tables at a bench are as high as the arm's base
 GIVEN_WITH_THE_RUN = frozenset(item.name for item in fields(WorldParameters)) | {"scene"}
 
 
@@ -50,6 +58,18 @@ def finger_joints(arm: str) -> list[str]:
 def base_frame(arm: str) -> str:
     """Name of the frame of its base."""
     return f"{arm}_link0"
+
+
+def _workspace(numbers: Sequence[float]) -> Workspace:
+    """The workspace that a parameter says.
+
+    Raises:
+        InvalidParameterError: It has not six numbers, or is empty.
+    """
+    if len(numbers) != len(WORKSPACE):
+        raise InvalidParameterError("parameter workspace is x y z at its lowest and at its highest")
+    x, y, z, to_x, to_y, to_z = numbers
+    return Workspace((x, y, z), (to_x, to_y, to_z))
 
 
 @dataclass(frozen=True)
@@ -83,12 +103,7 @@ class RobotParameters:
         Raises:
             InvalidParameterError: An unknown arm, or a speed or workspace that there is not.
         """
-        if len(self.workspace) != len(WORKSPACE):
-            raise InvalidParameterError(
-                "parameter workspace is x y z at its lowest and at its highest"
-            )
-        x, y, z, to_x, to_y, to_z = self.workspace
-        return arm_limits(self.arm).scaled(self.speed, Workspace((x, y, z), (to_x, to_y, to_z)))
+        return arm_limits(self.arm).scaled(self.speed, _workspace(self.workspace))
 
     @property
     def tracking(self) -> TrackingSettings:
@@ -125,6 +140,48 @@ class RobotBridgeParameters(RobotParameters, WorldParameters):
         """
         limits = franka_limits(self.limits, self.speed)
         return MotionLimits.of(limits, tuple(self.speed * jerk for jerk in JERK))
+
+
+@dataclass(frozen=True)
+class ServoBridgeParameters(WorldParameters):
+    """What a robot at a bench is: see the docstring of ``robot_bridge.servo.node``."""
+
+    domain: str = parameter("stack_at_target", "which domain")
+    arm: str = parameter("panda", "prefix of joints and frames")
+    workspace: tuple[float, ...] = parameter(
+        BENCH, "m, fingertips, lowest x y z, highest", low=-10.0
+    )
+    trajectory_topic: str = parameter(TRAJECTORY_TOPIC, "topic of the arm's controller")
+    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
+    gripper_scale: float = parameter(0.5, "position to be sent per m between the fingers")
+    gripper_effort: float = parameter(20.0, "N")
+    position_noise: float = parameter(0.0005, "m, of detections, along each axis")
+    turn_noise: float = parameter(0.005, "rad, of detections, about each axis")
+    joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
+    detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
+    hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
+    pace: float = parameter(
+        1.0, "how many times faster than a real robot's its time passes", low=0.01, high=1e3
+    )
+
+    @property
+    def choice(self) -> DomainChoice:
+        """The domain that runs, whose states are measured."""
+        return replace(super().choice, measured=True)
+
+    @property
+    def space(self) -> Workspace:
+        """Where the fingertips may be.
+
+        Raises:
+            InvalidParameterError: It has not six numbers, or is empty.
+        """
+        return _workspace(self.workspace)
+
+    @property
+    def tracking(self) -> TrackingSettings:
+        """How well detections can be trusted."""
+        return TrackingSettings(self.position_noise, self.turn_noise)
 
 
 @dataclass(frozen=True)
@@ -180,6 +237,11 @@ class MujocoRobotParameters(CameraParameters, SimulatedRobotParameters):
     goal_tolerance: float = parameter(0.05, "rad, by which a joint may be off at the end; 0: any")
     stopped_velocity: float = parameter(0.01, "rad/s, of a joint that stands; 0: any")
     goal_time: float = parameter(1.0, "s, by which the arm may arrive late; 0: any time")
+    trajectory_topic: str = parameter(
+        TRAJECTORY_TOPIC, "topic of trajectories that replace one another"
+    )
+    stiffness: float = parameter(1.0, "of the arm's joints, as a factor", low=0.01, high=1e3)
+    lag: float = parameter(0.07, "s, by which a joint in motion is late", low=0.001, high=10.0)
 
 
 @dataclass(frozen=True)
@@ -306,3 +368,15 @@ def parse_robot_bridge(text: str) -> dict[str, str | int | float | tuple[float, 
         InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
     return parse_parameters(text, RobotBridgeParameters, "robot", GIVEN_WITH_THE_RUN)
+
+
+def parse_servo_bridge(text: str) -> dict[str, str | int | float | tuple[float, ...]]:
+    """The parameters of the bridge at a bench as a command line has them: ``gripper_effort=40``.
+
+    Returns:
+        Parameters by name, of the types that they have.
+
+    Raises:
+        InvalidParameterError: An unknown parameter, or a value that it cannot have.
+    """
+    return parse_parameters(text, ServoBridgeParameters, "robot", GIVEN_WITH_THE_RUN | {"pace"})

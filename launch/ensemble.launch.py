@@ -6,6 +6,8 @@ On a robot: ``domain:=obstacle_tower world:=robot scene:=FILE``. Without one: ``
 ``world:=mujoco`` for a robot in another engine than the planner's; there, ``camera:=true
 scene:=FILE`` has a camera see tagged objects. On a Franka arm by its own protocol:
 ``world:=franka ip:=172.16.0.2 scene:=FILE``; on a simulated one: ``world:=franka-sim``.
+A domain of the contact world on a robot in MuJoCo: ``domain:=stack_at_target world:=mujoco
+servo:=true``.
 
 ``params_file:=FILE`` sets any other parameter of any node, in a copy of ``config/ensemble.yaml``.
 
@@ -49,6 +51,10 @@ ARGUMENTS = {
         "false",
         "start tag_detector, for the tags of the scene file; a robot in MuJoCo has a camera then",
     ),
+    "servo": (
+        "false",
+        "command the robot while it moves, as domains of the contact world need it",
+    ),
     "record": ("", "folder of the bag to record; empty: none"),
     "rviz": ("false", "open RViz as well"),
     "namespace": ("", "namespace of every node: /robot1 gives /robot1/slap/state"),
@@ -60,7 +66,7 @@ ROBOTS = {  # nodes that are a robot or drive one, by world
     "franka-sim": "franka_driver",
 }
 CHOICES = {"world": ["sim", "robot", *ROBOTS]} | {
-    name: ["true", "false"] for name in ("acquisition", "camera", "rviz")
+    name: ["true", "false"] for name in ("acquisition", "camera", "servo", "rviz")
 }
 # Parameter files that go before ensemble.yaml and robot.yaml, by world.
 CONFIGURED = {
@@ -97,6 +103,7 @@ SHORTCUTS = ("shortcuts", "samples")
 TAKEN = {  # arguments that each node takes as its parameters
     "sim_node": (*TASK, "pace"),
     "robot_bridge": (*TASK, "arm", "scene", "speed"),
+    "servo_bridge": (*TASK, "arm"),
     "mock_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
     "mujoco_robot": (*TASK, "arm", "latency", "pose_noise", "dropout", "scene"),
     "franka_driver": (*TASK, "arm", "ip", "speed"),
@@ -139,7 +146,8 @@ def _discovery_range() -> list[Action]:
 def _nodes(context: LaunchContext) -> list[Node]:
     """The nodes that the arguments ask for."""
     given = {name: value for name, value in context.launch_configurations.items() if value}
-    names = ["sim_node"] if given["world"] == "sim" else ["robot_bridge"]
+    bridge = "servo_bridge" if given["servo"] == "true" else "robot_bridge"
+    names = ["sim_node"] if given["world"] == "sim" else [bridge]
     names += [ROBOTS[given["world"]]] if given["world"] in ROBOTS else []
     names += ["tag_detector"] if given["camera"] == "true" else []
     names += ["perception_node", "skill_server", "planner_node"]

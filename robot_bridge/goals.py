@@ -7,9 +7,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from control_msgs.action import FollowJointTrajectory, GripperCommand
+from control_msgs.action import GripperCommand
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
+from trajectory_msgs.msg import JointTrajectory
 
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 
@@ -38,8 +39,8 @@ class GoalUnderWay:
         self._ended = self._handle = None
 
 
-def trajectory_points(goal: FollowJointTrajectory.Goal) -> list[TrajectoryPoint]:
-    """The points of a goal, in the order of its own joints."""
+def trajectory_points(trajectory: JointTrajectory) -> list[TrajectoryPoint]:
+    """The points of a trajectory, in the order of its own joints."""
     return [
         TrajectoryPoint(
             point.time_from_start.sec + point.time_from_start.nanosec * 1e-9,
@@ -47,14 +48,14 @@ def trajectory_points(goal: FollowJointTrajectory.Goal) -> list[TrajectoryPoint]
             tuple(point.velocities),
             tuple(point.accelerations),
         )
-        for point in goal.trajectory.points
+        for point in trajectory.points
     ]
 
 
-def points_of(goal: FollowJointTrajectory.Goal, joints: Sequence[str]) -> list[TrajectoryPoint]:
-    """The points of a goal, in the order of the controller's joints."""
-    order = [list(goal.trajectory.joint_names).index(name) for name in joints]
-    return [in_order(point, order) for point in trajectory_points(goal)]
+def points_of(trajectory: JointTrajectory, joints: Sequence[str]) -> list[TrajectoryPoint]:
+    """The points of a trajectory, in the order of the controller's joints."""
+    order = [list(trajectory.joint_names).index(name) for name in joints]
+    return [in_order(point, order) for point in trajectory_points(trajectory)]
 
 
 def is_finite(goal: GripperCommand.Goal) -> bool:

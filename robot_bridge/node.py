@@ -85,6 +85,7 @@ from ensemble.lockstep_world import QUIET, LockstepWorld
 from ensemble.robot_parameters import RobotBridgeParameters
 from ensemble.steady_time import create_timer
 from robot_bridge.robot import Robot
+from robot_bridge.sole_bridge import require_alone
 from robot_bridge.step_measurement import StepMeasurement
 from slap_ros.core import Action, Task
 from slap_ros.errors import (
@@ -296,7 +297,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         try:
             state = self._robot.world.measure_first(self._since_s)
             if state is not None:
-                self._require_alone()
+                require_alone(self)
                 self._begin(state)
             elif self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout:
                 raise self._unmeasured
@@ -306,19 +307,6 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
                 self._reported_s = now_s
                 self.get_logger().warning(f"not yet: {error}")
                 self._publish_fault(error)
-
-    def _require_alone(self) -> None:
-        """Refuse to begin beside another bridge: both would command the arm.
-
-        Raises:
-            AlreadyRunningError: There is one, or one was killed a moment ago.
-        """
-        own = (self.get_name(), self.get_namespace())
-        if self.get_node_names_and_namespaces().count(own) > 1:
-            raise AlreadyRunningError(
-                f"another {self.get_name()} runs in {self.get_namespace()}, and one of them only "
-                "may command the arm: stop the other one"
-            )
 
     def _reset(self, request: ResetTask.Request) -> None:
         if request.initial_state.objects:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
+from typing import Protocol
 
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
@@ -23,7 +24,6 @@ from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
 from slap_ros.robot.joint_reading import JointLists, JointReading, gap_between, require_radians
 from slap_ros.robot.limits import arm_limits
-from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.tracking import measured_pose
 from slap_ros.vision.tags import SEARCHED
 
@@ -31,10 +31,33 @@ AHEAD = 0.05  # s, by which clocks of machines may differ
 QUIET = 10.0  # s between two log lines about joint states: a driver sends hundreds a second
 
 
-class Sensors:
-    """Gives joint positions and detections to a RobotWorld; counts what that refuses."""
+class MeasuredRobot(Protocol):
+    """What takes measurements; each may refuse one with an InvalidMeasurementError."""
 
-    def __init__(self, node: Node, world: RobotWorld, arm: str, clock: JumpFreeClock) -> None:
+    def add_joint_reading(self, reading: JointReading) -> None:
+        """Take joint positions."""
+        ...
+
+    def add_detection(self, frame: str, stamp_s: float, base: Pose, seen: Pose) -> None:
+        """Take where a frame is detected.
+
+        Args:
+            frame: Name of the child frame.
+            stamp_s: Time of the measurement, s.
+            base: Pose of the parent frame in the base's frame.
+            seen: Pose of the child frame in its parent.
+        """
+        ...
+
+    def add_picture(self, stamp_s: float) -> None:
+        """Take that a picture was searched."""
+        ...
+
+
+class Sensors:
+    """Gives joint positions and detections to a robot's world; counts what that refuses."""
+
+    def __init__(self, node: Node, world: MeasuredRobot, arm: str, clock: JumpFreeClock) -> None:
         """Subscribe to joint states and frames.
 
         Args:

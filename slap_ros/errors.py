@@ -319,7 +319,7 @@ class InvalidSceneError(SlapError):
 
 
 class OpenLoopOnlyError(SlapError):
-    """A domain whose states cannot be measured on a robot, to be run on one in closed loop."""
+    """A domain of the contact world, in closed loop on an arm that stands between commands."""
 
     code = ErrorCode.OPEN_LOOP_ONLY
 

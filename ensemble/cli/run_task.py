@@ -28,6 +28,7 @@ from ensemble.robot_parameters import (
     parse_mock_robot,
     parse_mujoco_robot,
     parse_robot_bridge,
+    parse_servo_bridge,
 )
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
@@ -115,16 +116,20 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
     Raises:
         SlapError: The domain, or what perceives it, cannot do what is asked for.
     """
-    goal = _check_planning(options, domain, task)
+    goal, servo = _check_planning(options, domain, task), False
     if options.world != SIM:
         # Physics is needed only here: planar domains run without it.
+        from slap_ros.robot.servoed_robot import is_servoed, require_servoed
         from slap_ros.robot.usable_domains import require_robot
 
-        require_robot(domain, task.initial_state)
+        servo = options.world == MUJOCO and is_servoed(domain)
+        if servo:
+            _require_frames(options)
+        (require_servoed if servo else require_robot)(domain, task.initial_state)
     if options.world == MUJOCO:
         require_mujoco()
         _require_camera(options, domain)
-    bridge, franka = _robot(options)
+    bridge, franka = _robot(options, servo)
     perception = parse_parameters(options.perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**perception).quality
     quality.require_known(task.initial_state.layout.by_name.keys())
@@ -140,6 +145,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         shortcuts=GROWN if options.grow else options.shortcuts or "",
         samples=options.samples,
         world=options.world,
+        servo=servo,
         scene=str(options.scene or bridge.get("scene", "")),
         mock=parse_mock_robot(options.mock),
         mujoco=parse_mujoco_robot(options.mujoco),
@@ -168,12 +174,18 @@ def _skill_request(options: RunOptions) -> SkillRequest | None:
     return SkillRequest(options.proposer, options.rewarder, training=training)
 
 
-def _robot(options: RunOptions) -> tuple[Parameters, Parameters]:
+def _robot(options: RunOptions, servo: bool) -> tuple[Parameters, Parameters]:
     """Parameters of the bridge, and of a Franka arm's driver.
+
+    Args:
+        options: Options of the command.
+        servo: Whether the bridge is the one that commands a robot while it moves.
 
     Raises:
         InvalidParameterError: One is unknown or missing, or a library is not installed.
     """
+    if servo:
+        return parse_servo_bridge(options.robot), {}
     if options.world not in (FRANKA, FRANKA_SIM):
         return parse_robot_bridge(options.robot), {}
     bridge, driver = parse_franka(options.robot)
@@ -189,6 +201,19 @@ def _robot(options: RunOptions) -> tuple[Parameters, Parameters]:
             "--world franka needs the robot's address: --robot ip=172.16.0.2"
         )
     return bridge, driver
+
+
+def _require_frames(options: RunOptions) -> None:
+    """Refuse another way to detect things than as the frames of a sampled task's objects.
+
+    Raises:
+        InvalidParameterError: There is a scene file, or a camera.
+    """
+    if options.scene is not None or parse_mujoco_robot(options.mujoco).get("camera"):
+        raise InvalidParameterError(
+            f"{options.domain} has no scene files and no camera: its robot is commanded while it "
+            "moves, and detections must not wait until it stands"
+        )
 
 
 def _require_camera(options: RunOptions, domain: Domain) -> None:

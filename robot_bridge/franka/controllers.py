@@ -56,8 +56,10 @@ class FrankaArmController:
     def _on_goal(self, goal: FollowJointTrajectory.Goal) -> GoalResponse:
         try:
             self._arm.require_ready()
-            require_followable(goal.trajectory.joint_names, self._joints, trajectory_points(goal))
-            self._arm.require_possible(points_of(goal, self._joints))
+            require_followable(
+                goal.trajectory.joint_names, self._joints, trajectory_points(goal.trajectory)
+            )
+            self._arm.require_possible(points_of(goal.trajectory, self._joints))
         except SlapError as error:
             self._counts["refused"] += 1
             self._node.get_logger().warning(f"refused: {error}")
@@ -65,7 +67,7 @@ class FrankaArmController:
         return GoalResponse.ACCEPT
 
     async def _move(self, handle: ServerGoalHandle) -> FollowJointTrajectory.Result:
-        points = points_of(handle.request, self._joints)
+        points = points_of(handle.request.trajectory, self._joints)
         self.busy = True
         try:
             moved = self._arm.follow(points)

@@ -102,7 +102,7 @@ class MockControllers:
     async def _follow(self, goal: ServerGoalHandle) -> FollowJointTrajectory.Result:
         """Go from point to point, however fast the arm may be at them."""
         began_s = 0.0
-        for point in trajectory_points(goal.request):
+        for point in trajectory_points(goal.request.trajectory):
             if not await self._approach(goal, point, point.time_s - began_s):
                 self._counts["canceled"] += 1
                 goal.canceled()

@@ -22,6 +22,7 @@ from robot_bridge.transforms import transform
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import State
+from slap_ros.robot.mujoco.arm import ArmMotors
 from slap_ros.robot.mujoco.camera import tagged_plant
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.mujoco.rendering_process import Picture, RenderingProcess, Shot
@@ -52,7 +53,8 @@ def plant_with_camera(
             f"{domain.name} --seed {settings.seed} --tags FOLDER, then --scene FOLDER/scene.yaml"
         )
     tags = placed_tags(read_scene_config(Path(settings.scene), domain))
-    return tagged_plant(domain, initial, tags, settings.pinhole, settings.optical_pose)
+    motors = ArmMotors(settings.stiffness, settings.lag)
+    return tagged_plant(domain, initial, tags, settings.pinhole, settings.optical_pose, motors)
 
 
 class CameraPublisher:

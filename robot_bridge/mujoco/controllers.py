@@ -16,8 +16,10 @@ from control_msgs.msg import JointTolerance
 from rclpy.action import GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
+from trajectory_msgs.msg import JointTrajectory
 
-from ensemble.robot_parameters import MujocoRobotParameters, arm_joints
+from ensemble.interfaces import VOLATILE
+from ensemble.robot_parameters import MujocoRobotParameters, action_name, arm_joints
 from robot_bridge.action_servers import arm_server, gripper_server
 from robot_bridge.goals import GoalUnderWay, is_finite, points_of, trajectory_points
 from robot_bridge.simulated.noise_model import NoiseModel
@@ -25,7 +27,7 @@ from robot_bridge.simulated.waiting import pause
 from slap_ros.errors import InvalidCommandError
 from slap_ros.messages.decode import stamp_ns
 from slap_ros.robot.finger_tracking import FingerTracker, GripOutcome
-from slap_ros.robot.joint_trajectory import require_followable
+from slap_ros.robot.joint_trajectory import TrajectoryPoint, require_followable
 from slap_ros.robot.mujoco.arm import FINGER_FORCE
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.trajectory_tracking import (
@@ -41,7 +43,7 @@ CANCELED = TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "canceled")
 
 
 class MujocoArmController:
-    """The arm's controller: one trajectory at a time; a new one replaces it."""
+    """The arm's controller: one trajectory at a time, by action or topic; a new one replaces it."""
 
     def __init__(
         self,
@@ -66,6 +68,8 @@ class MujocoArmController:
         self._tracker = TrajectoryTracker(plant.joints)
         self._goal = GoalUnderWay()
         self._server = arm_server(node, settings, self._move, self._on_goal)
+        topic = action_name(settings.trajectory_topic, settings.arm)
+        node.create_subscription(JointTrajectory, topic, self._on_trajectory, VOLATILE)
 
     def destroy(self) -> None:
         """Destroy the action server."""
@@ -91,17 +95,40 @@ class MujocoArmController:
 
     def _on_goal(self, goal: FollowJointTrajectory.Goal) -> GoalResponse:
         try:
-            require_followable(goal.trajectory.joint_names, self._joints, trajectory_points(goal))
+            self._require_followable(goal.trajectory)
             self._require_to_come(goal)
         except InvalidCommandError as error:
-            self._counts["refused"] += 1
-            self._node.get_logger().warning(f"refused: {error}")
+            self._refuse(error)
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
+    def _require_followable(self, trajectory: JointTrajectory) -> None:
+        points = trajectory_points(trajectory)
+        require_followable(trajectory.joint_names, self._joints, points)
+
+    def _refuse(self, error: InvalidCommandError) -> None:
+        self._counts["refused"] += 1
+        self._node.get_logger().warning(f"refused: {error}")
+
+    def _on_trajectory(self, trajectory: JointTrajectory) -> None:
+        """Follow a trajectory of the topic, which nobody is told the end of."""
+        try:
+            self._require_followable(trajectory)
+        except InvalidCommandError as error:
+            self._refuse(error)
+        else:
+            self._counts["replaced"] += self._tracker.busy
+            self._node.executor.create_task(self._follow(points_of(trajectory, self._joints)))
+
+    async def _follow(self, points: Sequence[TrajectoryPoint]) -> None:
+        await pause(self._node, self._noise.delay_s())
+        self._goal.end(PREEMPTED)
+        plant, tolerances = self._plant, self._usual_tolerances
+        self._tracker.start(points, tolerances, plant.time_s, plant.joints, plant.joint_velocities)
+
     def _require_to_come(self, goal: FollowJointTrajectory.Goal) -> None:
         """Refuse a trajectory that was to end in the past."""
-        if self._late_s(goal) > trajectory_points(goal)[-1].time_s:
+        if self._late_s(goal) > trajectory_points(goal.trajectory)[-1].time_s:
             raise InvalidCommandError("the trajectory was to end in the past")
 
     def _late_s(self, goal: FollowJointTrajectory.Goal) -> float:
@@ -116,7 +143,7 @@ class MujocoArmController:
         self._goal.end(PREEMPTED)
         goal, plant = handle.request, self._plant
         self._tracker.start(
-            points_of(goal, self._joints),
+            points_of(goal.trajectory, self._joints),
             self._tolerances(goal),
             plant.time_s - self._late_s(goal),
             plant.joints,
@@ -139,6 +166,17 @@ class MujocoArmController:
             handle.abort()
         return FollowJointTrajectory.Result(
             error_code=int(outcome.code), error_string=outcome.reason
+        )
+
+    @property
+    def _usual_tolerances(self) -> TrajectoryTolerances:
+        """The node's own."""
+        settings = self._settings
+        return TrajectoryTolerances(
+            (settings.path_tolerance,) * len(self._joints),
+            (settings.goal_tolerance,) * len(self._joints),
+            settings.stopped_velocity,
+            settings.goal_time,
         )
 
     def _tolerances(self, goal: FollowJointTrajectory.Goal) -> TrajectoryTolerances:

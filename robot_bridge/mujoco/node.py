@@ -18,6 +18,10 @@ ROS Parameters:
         on the way and at the end, where a goal says nothing else; 0: any.
     stopped_velocity (double, 0.01): rad/s, of a joint that stands at the end.
     goal_time (double, 1.0): s, by which the arm may arrive late; 0: any time.
+    trajectory_topic (string, "ARM_arm_controller/joint_trajectory"): topic of trajectories that
+        replace one another, without an answer; ARM in it is replaced by the parameter arm.
+    stiffness (double, 1.0): of the arm's joints, as a factor; the largest torques stay.
+    lag (double, 0.07): s, by which a joint in motion is behind its command.
     latency (double, 0.02), jitter (double, 0.0): s, of goals and detections.
     pose_noise (double, 0.0): m, standard deviation of detections along each axis.
     turn_noise (double, 0.0): rad, standard deviation of detections about each axis.
@@ -36,6 +40,9 @@ ROS Parameters:
     image_noise (double, 2.0): grey levels of 255; image_blur (double, 0.0): pixels; standard
         deviations.
     image_loss (double, 0.0): share of pictures that are lost.
+
+Subscribers:
+    trajectory_topic (trajectory_msgs/JointTrajectory).
 
 Publishers:
     joint_states (sensor_msgs/JointState): of arm and fingers.
@@ -66,7 +73,7 @@ from ensemble.steady_time import create_timer
 from robot_bridge.mujoco.controllers import MujocoArmController, MujocoGripperController
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.sensors import DetectionPublisher, JointStatePublisher
-from slap_ros.robot.mujoco.arm import PERIOD_S
+from slap_ros.robot.mujoco.arm import PERIOD_S, ArmMotors
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.skills.domain_choice import open_domain
 
@@ -103,9 +110,10 @@ class MujocoRobot(Node):
             self._plant, model = plant_with_camera(domain, initial, settings)
             self._camera = CameraPublisher(self, self._plant, model, settings)
         else:
-            self._plant = MujocoPlant.of(domain, initial)
+            motors = ArmMotors(settings.stiffness, settings.lag)
+            self._plant = MujocoPlant.of(domain, initial, motors)
             self._detections = DetectionPublisher(self, self._plant, noise, settings)
-        self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0)
+        self._counts = Counter(motions=0, replaced=0, grips=0, refused=0, aborted=0, canceled=0)
         self._arm = MujocoArmController(self, self._plant, noise, settings, self._counts)
         self._gripper = MujocoGripperController(self, self._plant, noise, settings, self._counts)
         self._joints = JointStatePublisher(self, self._plant, noise, settings)

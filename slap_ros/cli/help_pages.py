@@ -60,7 +60,20 @@ PANELS: Mapping[str, str] = {
         LEARNING,
     ),
     **dict.fromkeys(
-        ("world", "scene", "mock", "mujoco", "perception", "to", "robot", "dry_run", "yes"), ROBOT
+        (
+            "world",
+            "scene",
+            "mock",
+            "mujoco",
+            "perception",
+            "to",
+            "robot",
+            "dry_run",
+            "yes",
+            "stiffness",
+            "lag",
+        ),
+        ROBOT,
     ),
     **dict.fromkeys(
         ("output", "json", "record", "render", "size", "report", "live", "live_port", "watched"),

@@ -119,6 +119,18 @@ class Track:
         """Stamp of the newest detection; minus infinity without one."""
         return self._detections[-1].stamp_s if self._detections else -math.inf
 
+    @property
+    def newest(self) -> Detection:
+        """The newest detection; there must be one."""
+        return self._detections[-1]
+
+    def newest_motion(self) -> PoseEstimate | None:
+        """The pose and its motion from the last detections alone; None if they are too few."""
+        few = list(self._detections)[-self._settings.confirmations :]
+        if len(few) < self._settings.confirmations:
+            return None
+        return _standing(few) if self._agree(few) else _moving(few)
+
     def estimate(self, since_s: float) -> PoseEstimate | None:
         """The pose and its motion from detections since then; None if they are too few."""
         fresh = [d for d in self._detections if d.stamp_s > since_s]

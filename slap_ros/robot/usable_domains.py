@@ -35,12 +35,14 @@ def require_robot(domain: Domain, initial: State) -> None:
 
 
 def _require_closed_loop(domain: Domain) -> None:
-    """Refuse a domain whose states a robot cannot measure."""
+    """Refuse a domain whose states cannot be measured on an arm that stands between commands."""
     if HAND_OF_FORCES in domain.types:
         raise OpenLoopOnlyError(
-            f"{domain.name} cannot run on a robot: its states have the target that the hand is "
-            "pulled to and the velocities of hand and fingers, which nothing measures; record a "
-            "run in simulation, then `slap bag replay BAG --to robot --dry-run` checks its motion"
+            f"{domain.name} cannot run on this robot, whose arm stands between two commands: its "
+            "skills act on where the hand was told to be and on its velocity, which nothing "
+            "measures then. The robot in MuJoCo is commanded while it moves: use --world mujoco. "
+            "Or record a run in simulation: `slap bag replay BAG --to robot --dry-run` checks its "
+            "motion"
         )
 
 

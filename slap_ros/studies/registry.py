@@ -11,6 +11,7 @@ from typing import Any
 from slap_ros.studies.lg_sail import (
     acquisition,
     acquisition_ablation,
+    closed_loop,
     demonstrations,
     imitation,
     induction,
@@ -71,6 +72,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         progress.STUDY,
         imitation.STUDY,
         open_loop.STUDY,
+        closed_loop.STUDY,
         warm_start.STUDY,
         acquisition_ablation.STUDY,
         retrieval.STUDY,

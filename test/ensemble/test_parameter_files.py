@@ -19,6 +19,7 @@ from ensemble.robot_parameters import (
     MockRobotParameters,
     MujocoRobotParameters,
     RobotBridgeParameters,
+    ServoBridgeParameters,
 )
 from planner_node.node import PlannerParameters
 from recorder_node.node import RecorderParameters
@@ -31,6 +32,7 @@ FILES = sorted(path.name for path in CONFIG.glob("*.yaml"))
 KINDS = {
     "sim_node": (SimParameters,),
     "robot_bridge": (RobotBridgeParameters,),
+    "servo_bridge": (ServoBridgeParameters,),
     "mock_robot": (MockRobotParameters,),
     "mujoco_robot": (MujocoRobotParameters,),
     "franka_driver": (FrankaDriverParameters,),
@@ -94,3 +96,11 @@ def test_a_launched_simulated_fr3_has_the_parameters_of_a_started_one():
     simulated = blocks("franka-sim.yaml")
     assert simulated["franka_driver"].items() <= started["robot_bridge.franka"].items()
     assert simulated["skill_server"].items() <= started["skill_server"].items()
+
+
+def test_a_launched_robot_at_a_bench_has_the_parameters_of_a_started_one():
+    chosen = DomainChoice("stack_at_target", "fair")
+    settings = RunSettings(chosen, 1, 0, "lazy", None, world="mujoco", servo=True)
+    launched = blocks("mujoco.yaml")["servo_bridge"]
+    started = node_parameters(settings)["robot_bridge.servo"]
+    assert {key: as_default(value) for key, value in launched.items()}.items() <= started.items()

@@ -13,9 +13,11 @@ from slap_ros.domains.make_coffee.scenery import LID_HIGH
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import solve
 from slap_ros.geometry.pose import rotate
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.recorded_motion import RecordedMotion
-from slap_ros.robot.robot_world import GripperAction
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.worlds.contact.command import HandCommand
+from slap_ros.worlds.contact.snapshot import ContactIndex
 
 pytest.importorskip("pybullet")
 mujoco = pytest.importorskip("mujoco")
@@ -123,7 +125,8 @@ def test_a_state_that_a_plant_begins_in_is_measured_there(drawer, lid):
     }
     begun = opened(state, cabinet=drawer, holder=lid).replace(there)
     plant, scene = MujocoPlant.of(domain, begun), scene_around(domain, begun)
-    measured = measured_state(scene, begun, plant)
+    told = HandCommand.of(ContactIndex.of(scene, begun.layout).read(begun).hand)
+    measured = measured_state(scene, begun, plant, told)
     for name, opening in (("cabinet", drawer), ("holder", lid)):
         obj = measured.layout.object(name)
         assert measured.get(obj, "opening") == pytest.approx(opening, abs=SAME)

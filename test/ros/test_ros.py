@@ -45,7 +45,14 @@ PATIENT = """
 def test_the_executables_of_the_page_are_there():
     listed = ros2("pkg", "executables", "slap_ros").split()
     page = (ROOT / "docs" / "ros2.md").read_text()
-    for name in (*EXECUTABLES, "mujoco_robot", "franka_driver", "tag_detector", "slap"):
+    for name in (
+        *EXECUTABLES,
+        "servo_bridge",
+        "mujoco_robot",
+        "franka_driver",
+        "tag_detector",
+        "slap",
+    ):
         assert name in listed
         assert f"ros2 run slap_ros {name}" in page
 

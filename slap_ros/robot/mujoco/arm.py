@@ -9,8 +9,11 @@ gripper's do, and press with a force that is set.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
+from slap_ros.errors import InvalidParameterError
 from slap_ros.files import read_text
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.worlds.bullet import PANDA
@@ -23,7 +26,7 @@ FINGER_JOINTS = ("panda_finger_joint1", "panda_finger_joint2")
 # Softer than a position controller's, whose arm jams where it meets something, and harder than an
 # impedance controller's, whose arm would sag under a block by a centimetre.
 STIFFNESS = (1100.0, 1100.0, 900.0, 900.0, 500.0, 500.0, 500.0)  # Nm/rad
-LAG_S = 0.07  # s, by which a joint in motion is behind: damping over stiffness
+LAG_S = 0.07  # s
 TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # Nm, Franka's data sheet
 ARMATURE = 0.1  # kg m², of a motor, seen from the joint
 JOINT_DAMPING = 1.0  # Nm s/rad
@@ -44,8 +47,35 @@ SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
 NO_SLIP_ITERATIONS = 5  # of the solver that takes the creeping out of friction
 
 
-def arm_spec() -> Any:
-    """A new ``mujoco.MjSpec`` with the arm alone, its base at the origin."""
+@dataclass(frozen=True)
+class ArmMotors:
+    """How hard the arm's motors pull joints to their commands, up to the Panda's torques.
+
+    Args:
+        stiffness: How many times as stiff as ``STIFFNESS`` each joint is.
+        lag_s: Time by which a joint in motion is behind its command, s: damping over stiffness.
+
+    Raises:
+        InvalidParameterError: One is not above 0.
+    """
+
+    stiffness: float = 1.0
+    lag_s: float = LAG_S
+
+    def __post_init__(self) -> None:
+        """Check that a motor can be so."""
+        for name, value in (("stiffness", self.stiffness), ("lag_s", self.lag_s)):
+            if not 0.0 < value < math.inf:
+                raise InvalidParameterError(f"{name} of an arm's motors is {value}, not above 0")
+
+
+def arm_spec(motors: ArmMotors | None = None) -> Any:
+    """A new ``mujoco.MjSpec`` with the arm alone, its base at the origin.
+
+    Args:
+        motors: How hard its joints are held.
+    """
+    motors = motors or ArmMotors()
     spec = mujoco.MjSpec.from_string(_urdf())
     _set_options(spec.option)
     for body in spec.bodies:
@@ -58,8 +88,9 @@ def arm_spec() -> Any:
         joint.armature = FINGER_ARMATURE if finger else ARMATURE
         joint.damping = [0.0 if finger else JOINT_DAMPING, 0.0, 0.0]
         joint.actfrclimited = False  # the URDF's efforts: 20 N of each finger; motors have theirs
-    for name, stiffness, torque in zip(ARM_JOINTS, STIFFNESS, TORQUE, strict=True):
-        _add_motor(spec, name, stiffness, LAG_S * stiffness, torque)
+    for name, usual, torque in zip(ARM_JOINTS, STIFFNESS, TORQUE, strict=True):
+        stiffness = motors.stiffness * usual
+        _add_motor(spec, name, stiffness, motors.lag_s * stiffness, torque)
     for name in FINGER_JOINTS:
         _add_motor(spec, name, FINGER_STIFFNESS, FINGER_DAMPING, FINGER_FORCE)
     _couple_fingers(spec)

@@ -23,6 +23,7 @@ from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.plant import PERIOD_S, MujocoPlant
 from slap_ros.robot.mujoco.plant_controllers import REACH, TOLERANCES, PlantControllers
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
+from slap_ros.worlds.contact.command import HandCommand
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.features import pose_of
@@ -94,7 +95,8 @@ class OpenLoopPlayer:
             self._controllers.move(motion)
         for _ in range(round(COMING_TO_REST_S / PERIOD_S)):
             self._controllers.pass_period()
-        return measured_state(self._scene, self._recorded.states[0], self.plant)
+        command = HandCommand.to_stay(grasp_pose(self.plant.joints), self.plant.closing)
+        return measured_state(self._scene, self._recorded.states[0], self.plant, command)
 
     def _act(self, waypoint: RecordedWaypoint) -> None:
         """Close or open the fingers before a waypoint, where the arm still stands."""

@@ -24,6 +24,7 @@ from slap_ros.robot.mujoco.arm import (
     FINGER_SPEED,
     LARGEST_FINGER_FORCE,
     PERIOD_S,
+    ArmMotors,
 )
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
@@ -75,15 +76,20 @@ class MujocoPlant:
         self._settle()
 
     @classmethod
-    def of(cls, domain: Domain, state: State) -> MujocoPlant:
+    def of(cls, domain: Domain, state: State, motors: ArmMotors | None = None) -> MujocoPlant:
         """The plant of a domain's state.
+
+        Args:
+            domain: Domain with a Panda.
+            state: State to begin in.
+            motors: How hard the arm's joints are held.
 
         Raises:
             InvalidSceneError: MuJoCo cannot express a body.
             InvalidParameterError: The domain has no Panda.
         """
         scene = scene_around(domain, state)
-        return cls(compiled(scene_spec(scene, state)), scene, state)
+        return cls(compiled(scene_spec(scene, state, motors)), scene, state)
 
     # -- what is measured -----------------------------------------------------------------------
 
@@ -101,6 +107,18 @@ class MujocoPlant:
     def joint_velocities(self) -> list[float]:
         """Joint velocities, rad/s."""
         return [float(v) for v in self._data.qvel[self._arm_speeds]]
+
+    @property
+    def fingers(self) -> tuple[float, float]:
+        """Distance of the left and of the right finger from the middle, m."""
+        left, right = self._data.qpos[self._fingers_at].tolist()
+        return (left, right)
+
+    @property
+    def finger_velocities(self) -> tuple[float, float]:
+        """How fast the left and the right finger open, m/s."""
+        left, right = self._data.qvel[self._finger_speeds].tolist()
+        return (left, right)
 
     @property
     def gap(self) -> float:

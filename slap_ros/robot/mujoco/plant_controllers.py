@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from slap_ros.errors import ControllerAbortedError, ControllerTimeoutError
 from slap_ros.robot.finger_tracking import FingerTracker
@@ -20,6 +20,9 @@ from slap_ros.worlds.panda import JOINTS
 
 REACH = Workspace((-0.9, -0.9, -0.4), (0.9, 0.9, 1.2))  # m: all that the arm reaches
 TOLERANCES = TrajectoryTolerances((0.2,) * JOINTS, (0.05,) * JOINTS, goal_time_s=1.0)
+UNCHECKED = TrajectoryTolerances(
+    (0.0,) * JOINTS, (0.0,) * JOINTS, stopped=0.0
+)  # replaced on the way
 STILL = (0.0,) * JOINTS
 GRIPPER_TIMEOUT_S = 5.0  # that the fingers may take, as long as the bridge waits
 
@@ -57,9 +60,7 @@ class PlantControllers:
             ControllerAbortedError: The arm is too far from where it should be.
         """
         plant = self._plant
-        points = [TrajectoryPoint(motion.duration_s, motion.target, STILL, STILL)]
-        velocities = plant.joint_velocities
-        self._arm.start(points, self._tolerances, plant.time_s, plant.joints, velocities)
+        self.replace_motion([TrajectoryPoint(motion.duration_s, motion.target, STILL, STILL)])
         while True:
             self.pass_period()
             outcome = self._arm.check(plant.time_s, plant.joints, plant.joint_velocities)
@@ -67,6 +68,24 @@ class PlantControllers:
                 raise ControllerAbortedError(f"a motion: {outcome.code.name}, {outcome.reason}")
             if outcome is not None:
                 return
+
+    def replace_motion(self, points: Sequence[TrajectoryPoint]) -> None:
+        """Begin a motion of the arm in place of the one under way; no time passes.
+
+        Args:
+            points: Points of the trajectory.
+        """
+        plant = self._plant
+        velocities = plant.joint_velocities
+        self._arm.start(points, self._tolerances, plant.time_s, plant.joints, velocities)
+
+    def command_fingers(self, gap: float) -> None:
+        """Begin a motion of the fingers; no time passes.
+
+        Args:
+            gap: Distance between them to go to, m.
+        """
+        self._plant.command_fingers(0.5 * gap, self._force)
 
     def move_fingers(self, gap: float) -> None:
         """Move the fingers until they are there, or stopped.
@@ -78,7 +97,7 @@ class PlantControllers:
             ControllerTimeoutError: They do not come to rest.
         """
         plant = self._plant
-        plant.command_fingers(0.5 * gap, self._force)
+        self.command_fingers(gap)
         self._fingers.start(gap, plant.time_s)
         until_s = plant.time_s + GRIPPER_TIMEOUT_S
         while self._fingers.check(plant.time_s, plant.gap, plant.gap_velocity) is None:

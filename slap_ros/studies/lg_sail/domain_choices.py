@@ -13,7 +13,7 @@ from slap_ros.api.command_options import CommandOption
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.policies.shipped_models import shipped_with_siblings
-from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, chosen_skills, open_domain
 from slap_ros.skills.skill_library import read_library_record
 
 SkillLibraries = Annotated[
@@ -68,6 +68,18 @@ def shipped_skills(domain: str) -> list[Path]:
             f"{domain}` made"
         )
     return folders
+
+
+def library_origin(choice: DomainChoice) -> str:
+    """What made the library of a choice, and with which seed, in words.
+
+    Args:
+        choice: Domain with the skills of a library.
+    """
+    library = chosen_skills(choice)
+    assert library is not None
+    made = [str(library.record.get(name, "manual")) for name in ("proposer", "rewarder")]
+    return f"{', '.join(made)}, seed {library.record.get('seed', 0)}"
 
 
 def hand_written(folders: Sequence[Path]) -> list[Path]:

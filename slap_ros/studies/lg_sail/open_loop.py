@@ -24,7 +24,7 @@ from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.relational import State
 from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.robot.recorded_motion import RecordedMotion
-from slap_ros.skills.domain_choice import DomainChoice, chosen_skills, open_domain
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.comparison import not_solved
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
@@ -32,6 +32,7 @@ from slap_ros.studies.lg_sail.domain_choices import (
     LibraryTasks,
     SkillLibraries,
     all_goals,
+    library_origin,
     shipped_skills,
     with_demonstrator,
 )
@@ -333,7 +334,7 @@ def prepare(options: OpenLoopOptions, tell: Tell) -> PreparedStudy:
     choices = {}
     for folder in folders:
         choice = DomainChoice(options.domain, preset, str(folder))
-        choices[_origin(choice)] = DomainChoice.of(open_chosen(choice, tell), choice.skills)
+        choices[library_origin(choice)] = DomainChoice.of(open_chosen(choice, tell), choice.skills)
     choices[DEMONSTRATED] = with_demonstrator(options.domain, preset)
     goals = options.goal or all_goals(get_domain(options.domain, preset))
     return PreparedStudy(
@@ -341,14 +342,6 @@ def prepare(options: OpenLoopOptions, tell: Tell) -> PreparedStudy:
         lambda runner: study(choices, goals, options.tasks, options.seed, runner),
         {"library": options.library, "goal": options.goal},
     )
-
-
-def _origin(choice: DomainChoice) -> str:
-    """What made a library, and with which seed."""
-    library = chosen_skills(choice)
-    assert library is not None
-    made = [str(library.record.get(name, "manual")) for name in ("proposer", "rewarder")]
-    return f"{', '.join(made)}, seed {library.record.get('seed', 0)}"
 
 
 STUDY = Study(

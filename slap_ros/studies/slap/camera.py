@@ -22,7 +22,7 @@ from slap_ros.studies.slap.transfer import (
     PhysicsResult,
     draw,
     measured_by,
-    solve_on_robot,
+    solve_measured,
     words,
 )
 from slap_ros.studies.study import PreparedStudy, Study
@@ -78,7 +78,7 @@ def solve_by_camera(setup: PlanningSetup, seed: int, index: int) -> Trial:
     Returns:
         What came of it; a robot that holds after a fault has not solved its task.
     """
-    return solve_on_robot(setup, seed, index, _before_a_camera)
+    return solve_measured(setup, seed, index, _before_a_camera)
 
 
 def _before_a_camera(domain: Domain, initial: State) -> ClosedLoopWorld:

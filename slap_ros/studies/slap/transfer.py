@@ -14,12 +14,9 @@ from typing import TYPE_CHECKING
 
 from slap_ros.api.left_out import Tell
 from slap_ros.core import Domain
-from slap_ros.errors import ErrorCode, SlapError
+from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.experiment import Trial
 from slap_ros.evaluation.summary import Summary, format_spread
-from slap_ros.perception import ExactPerceiver
-from slap_ros.planning.execution import EpisodeResult, Executor
-from slap_ros.planning.options import OptionResult
 from slap_ros.relational import State
 from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.skills.domain_choice import open_domain
@@ -27,12 +24,11 @@ from slap_ros.studies.comparison import ApproachResult, Comparison, PlanningSetu
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.robot_trials import MeasuredWorld, solve_on_robot
 from slap_ros.studies.study import PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from slap_ros.robot.mujoco.closed_loop import ClosedLoopWorld
 
 OWN, OTHER = "planner's physics", "MuJoCo"
 COLUMNS = (
@@ -145,11 +141,11 @@ def solve_in_mujoco(setup: PlanningSetup, seed: int, index: int) -> Trial:
     """
     from slap_ros.robot.mujoco.closed_loop import ClosedLoopWorld  # needs an extra
 
-    return solve_on_robot(setup, seed, index, ClosedLoopWorld)
+    return solve_measured(setup, seed, index, ClosedLoopWorld)
 
 
-def solve_on_robot(
-    setup: PlanningSetup, seed: int, index: int, make: Callable[[Domain, State], ClosedLoopWorld]
+def solve_measured(
+    setup: PlanningSetup, seed: int, index: int, make: Callable[[Domain, State], MeasuredWorld]
 ) -> Trial:
     """Plan for what is measured on a robot, and execute the plan there.
 
@@ -163,28 +159,7 @@ def solve_on_robot(
         What came of it.
     """
     domain = open_domain(replace(setup.choice, measured=True))
-    task = domain.task(seed, index)
-    try:
-        world = make(domain, task.initial_state)
-    except SlapError as error:  # nothing was measured
-        return Trial.of(seed, index, _ended_by(error))
-    try:
-        world.require_seen(task.goal)
-        space = domain.atom_space(world.state)
-        planner = setup.make_planner(domain, world.state)
-        goal, perceiver = space.mask(task.goal), ExactPerceiver(space, changing=True)
-        episode = Executor(
-            domain, planner, world, space, goal, task.step_limit, perceiver=perceiver
-        ).run()
-    except SlapError as error:  # a fault, after which the robot holds
-        episode = _ended_by(error)
-    finally:
-        world.close()
-    return Trial.of(seed, index, episode)
-
-
-def _ended_by(error: SlapError) -> EpisodeResult:
-    return EpisodeResult(error=OptionResult(error.code, str(error)))
+    return solve_on_robot(domain, domain.task(seed, index), setup.make_planner, make)
 
 
 def _ratio(relative: float | None) -> str:

@@ -18,6 +18,7 @@ from slap_ros.geometry.pose import (
     Pose,
     Vector,
     conjugate,
+    cross,
     from_rotation_vector,
     from_yaw,
     rotate,
@@ -233,7 +234,7 @@ class JointedBody:
         if self.joint.kind is JointKind.SLIDE:
             return 1.0
         corners = (corner for part in self.moving for corner in part.bounding_box.corners())
-        return max(math.dist(_cross(self.joint.axis, corner), ORIGIN) for corner in corners)
+        return max(math.dist(cross(self.joint.axis, corner), ORIGIN) for corner in corners)
 
     def moving_pose(self, pose: Pose, opening: float) -> Pose:
         """Where the moving part's frame is when the body stands at ``pose``."""
@@ -421,11 +422,6 @@ def bounding_box(parts: Sequence[Part]) -> OrientedBox:
 
 def _inner_boxes(parts: Sequence[Part], pose: Pose) -> tuple[OrientedBox, ...]:
     return tuple(part.inner_box.at(pose) for part in parts)
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    (x, y, z), (u, v, w) = a, b
-    return (y * w - z * v, z * u - x * w, x * v - y * u)
 
 
 def _extent(part: OrientedBox, axis: Vector) -> float:

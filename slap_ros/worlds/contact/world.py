@@ -10,13 +10,13 @@ for bit (``docs/contact.md`` says how, and what it costs).
 from __future__ import annotations
 
 from slap_ros.core import Action, ActionSpace, GripperAxis
-from slap_ros.geometry.pose import ORIGIN, Pose, from_rotation_vector, multiply
+from slap_ros.geometry.pose import ORIGIN
 from slap_ros.relational import Feature, State
-from slap_ros.worlds.contact.arm import Joints, arm_joints, in_time, share_in_time
+from slap_ros.worlds.contact.arm import Joints, arm_joints, in_time
+from slap_ros.worlds.contact.command import commanded
 from slap_ros.worlds.contact.contacts import ContactPoint
 from slap_ros.worlds.contact.dynamics import ContactDynamics
 from slap_ros.worlds.contact.features import GRIPPER, ROBOT
-from slap_ros.worlds.contact.hand import LEASH, YAW_LEASH, HandState, rotation_between
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.simulation_pool import acquire, release
 from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot
@@ -37,7 +37,6 @@ ACTION_SPACE = ActionSpace(
 )
 # Where an arm is nearly stretched, its joints go further than in proportion to the hand's way.
 PARTS = (1.0, 0.25, 0.06)  # of the way that seems to be possible, until it is
-ACTING = 0.5  # 1, beyond which the gripper is told something new
 
 
 class ContactWorld(SimulatedWorld[ContactScene]):
@@ -104,17 +103,13 @@ class ContactWorld(SimulatedWorld[ContactScene]):
         self._require_open()
         ACTION_SPACE.check(action)
         now = self._snapshot
-        told = _told(now.hand, action.tolist())
-        joints = arm_joints(told.target_pose)
-        if joints is None:
-            told = now.hand._replace(closing=told.closing)
-            joints = arm_joints(told.target_pose)
-        share = 0.0 if joints is None else share_in_time(now.joints, joints)
+        command = commanded(now.hand, now.joints, action)
+        told = command.hand
         held_back = told._replace(target=told.pose.position, target_yaw=told.yaw)
-        tries = [(told, part * share) for part in PARTS] + [(held_back, 0.0)]
+        tries = [(told, part) for part in PARTS] + [(held_back, 0.0)]
         for hand, part in tries:
-            way = _part_way(told.pose, told.target_pose, part)
-            after, self._contacts = self._dynamics.after(now._replace(hand=hand), way)
+            pull = command.pull(part)
+            after, self._contacts = self._dynamics.after(now._replace(hand=hand), pull)
             followed = _followed(now, after)
             if followed is not None:
                 self._snapshot = after._replace(joints=followed)
@@ -124,27 +119,6 @@ class ContactWorld(SimulatedWorld[ContactScene]):
             self._snapshot = after._replace(joints=now.joints, hand=stopped, held=None)
         self._state = self._index.write(self._state, self._snapshot)
         return self._state
-
-
-def _told(hand: HandState, action: list[float]) -> HandState:
-    """The hand with its target moved, no further than its leash, and its gripper told."""
-    *shift, turn, gripper = action
-    x, y, z = (
-        min(max(t + d, p - LEASH), p + LEASH)
-        for t, d, p in zip(hand.target, shift, hand.pose.position, strict=True)
-    )
-    yaw = min(max(hand.target_yaw + turn, hand.yaw - YAW_LEASH), hand.yaw + YAW_LEASH)
-    closing = gripper > ACTING or (hand.closing and gripper >= -ACTING)
-    return hand._replace(target=(x, y, z), target_yaw=yaw, closing=closing)
-
-
-def _part_way(start: Pose, goal: Pose, share: float) -> Pose:
-    """The pose after a share, up to 1, of the way."""
-    if share == 1.0:
-        return goal
-    x, y, z = (a + share * (b - a) for a, b in zip(start.position, goal.position, strict=True))
-    u, v, w = (share * r for r in rotation_between(start, goal))
-    return Pose((x, y, z), multiply(from_rotation_vector((u, v, w)), start.quaternion))
 
 
 def _followed(before: ContactSnapshot, after: ContactSnapshot) -> Joints | None:

@@ -1,0 +1,299 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot at a bench that is commanded while it moves, as far as encoders and detections say.
+
+A state of the contact world has velocities, what is held, and where the hand was told to be. The
+joints give the hand's velocity. Things that are detected in one place are at rest there; others
+move as their last detections do. What is between fingers that were told to close and stand is held:
+it goes with the hand, for detections are older than encoders. And what was told is known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from contextlib import suppress
+from dataclasses import replace
+
+from slap_ros.core import Action, Domain
+from slap_ros.errors import (
+    InvalidMeasurementError,
+    InvalidParameterError,
+    InvalidSceneError,
+    InvalidStateError,
+    NoJointStateError,
+)
+from slap_ros.geometry.pose import Pose, cross
+from slap_ros.relational import Object, State
+from slap_ros.robot.detected_objects import DetectedObjects
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.limits import Joints, Workspace
+from slap_ros.robot.scene_config import SceneConfig
+from slap_ros.robot.servoing import HandServo, ServoCommand, moving_hand
+from slap_ros.robot.state_assembly import possible_joints
+from slap_ros.robot.tracking import TrackingSettings
+from slap_ros.worlds.contact.command import HandCommand
+from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.hand import PAD, HandState
+from slap_ros.worlds.contact.snapshot import ContactIndex
+from slap_ros.worlds.contact.validation import GRASP_GAP
+from slap_ros.worlds.contact.world import ContactWorld
+from slap_ros.worlds.layout_index import BodyState
+from slap_ros.worlds.panda import FINGER_OPEN, grasp_pose
+from slap_ros.worlds.validation import share_space
+
+REMEMBERED = 256  # joint readings, for where the hand was when something was detected
+STANDING = 0.005  # m/s, of each finger: slower ones press, or are at their end
+STOPPED = 0.005  # m, from its end, of a finger that was told to close
+RATE_S = 0.02  # s, over which the fingers' velocity is taken
+
+
+def is_servoed(domain: Domain) -> bool:
+    """Whether a robot is commanded while it moves in a domain: whether its hand acts by forces."""
+    return ROBOT in domain.types
+
+
+def require_servoed(domain: Domain, initial: State) -> None:
+    """Refuse what a robot that is commanded while it moves cannot do, before anything is started.
+
+    Args:
+        domain: Domain whose hand acts by forces.
+        initial: State of a task.
+
+    Raises:
+        InvalidParameterError: Its world is disturbed on purpose.
+        InvalidSceneError: A body has a part that slides or turns.
+    """
+    if domain.make_model is not None:
+        raise InvalidParameterError(
+            f"{domain} has disturbances of its own, which only a simulation can have; use another "
+            "preset, or --world sim"
+        )
+    _contact_model(domain, initial).close()
+
+
+def _contact_model(domain: Domain, state: State) -> ContactWorld:
+    """The planner's world, where everything that moves is detected.
+
+    Raises:
+        InvalidSceneError: A body has a part that slides or turns.
+    """
+    model = domain.make_world(state)
+    assert isinstance(model, ContactWorld)
+    if jointed := model.scene.jointed:
+        model.close()
+        raise InvalidSceneError(
+            f"{domain.name} cannot run on a robot: nothing measures how far {jointed[0].name} is "
+            "open; use --world sim"
+        )
+    return model
+
+
+class ServoedRobot:
+    """A robot and the objects at its bench.
+
+    Args:
+        domain: Domain of the contact world.
+        scene_config: Objects of the scene, and how they are detected.
+        workspace: Space in which the fingertips may be told to be.
+        tracking: Settings of how far detections can be trusted.
+        pace: How many times faster than a real robot's its time passes.
+
+    Raises:
+        InvalidParameterError: The domain has another robot.
+        InvalidSceneError: A body has a part that slides or turns.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        scene_config: SceneConfig,
+        workspace: Workspace,
+        tracking: TrackingSettings,
+        pace: float = 1.0,
+    ) -> None:
+        if not is_servoed(domain):
+            raise InvalidParameterError(f"{domain.name} has no hand that acts by forces")
+        self.domain, self._workspace, self._pace = domain, workspace, pace
+        self._template = scene_config.template
+        self._model = _contact_model(domain, self._template)
+        self._index = ContactIndex.of(self._model.scene, self._template.layout)
+        self._detected = DetectedObjects(scene_config, tracking, lambda _: None)
+        self._readings: deque[JointReading] = deque(maxlen=REMEMBERED)
+        self._servo: HandServo | None = None
+        self._state: State | None = None  # measured last
+
+    # -- measurements ---------------------------------------------------------------------------
+
+    def add_detection(self, frame: str, stamp_s: float, base: Pose, seen: Pose) -> None:
+        """Take a detection; see :meth:`DetectedObjects.add`.
+
+        Args:
+            frame: Name of the child frame.
+            stamp_s: Time of the measurement, s.
+            base: Pose of the parent frame in the base's frame.
+            seen: Pose of the child frame in its parent.
+
+        Raises:
+            InvalidMeasurementError: It cannot be, or is not newer than the last one.
+        """
+        self._detected.add(frame, stamp_s * self._pace, base, seen)
+
+    def add_picture(self, stamp_s: float) -> None:
+        """Ignore that a picture was searched: what is not detected is not known."""
+
+    def add_joint_reading(self, reading: JointReading) -> None:
+        """Take joint positions.
+
+        Raises:
+            InvalidMeasurementError: They are older than the last ones.
+        """
+        taken = replace(reading, stamp_s=reading.stamp_s * self._pace)
+        if self._readings and taken.stamp_s <= self._readings[-1].stamp_s:
+            raise InvalidMeasurementError("joint positions are not newer than those before")
+        self._readings.append(taken)
+
+    @property
+    def newest_joints_s(self) -> float:
+        """Stamp of the newest joint positions; minus infinity without any."""
+        return self._readings[-1].stamp_s / self._pace if self._readings else -math.inf
+
+    @property
+    def arm_moves(self) -> bool:
+        """Whether the arm moved when its joints were measured last."""
+        return bool(self._readings) and not self._readings[-1].at_rest
+
+    def undetected(self, since_s: float) -> list[str]:
+        """Names of the objects that were not detected since a time, s."""
+        return [
+            o.name for o, t in self._detected.tracks.items() if t.newest_s <= since_s * self._pace
+        ]
+
+    # -- states ---------------------------------------------------------------------------------
+
+    def begin(self, since_s: float) -> State | None:
+        """The state in which a task begins: the arm stands where it was told to be.
+
+        Args:
+            since_s: Time since which everything is to be measured, s.
+
+        Returns:
+            The state; None while something is not measured yet, or the arm moves.
+
+        Raises:
+            InvalidStateError: What is measured cannot be.
+        """
+        if self.undetected(since_s) or not self._readings or self.arm_moves:
+            return None
+        newest = self._readings[-1]
+        closing = newest.gap is not None and 0.5 * newest.gap < FINGER_OPEN - STOPPED
+        stay = HandCommand.to_stay(grasp_pose(possible_joints(newest.joints)), closing)
+        state = self._assembled(since_s, stay)
+        if state is not None:
+            self._servo = HandServo(self._index, state, self._workspace)
+        return state
+
+    def measure(self, since_s: float) -> State | None:
+        """The state now.
+
+        Args:
+            since_s: Time since which joints are to be measured, s.
+
+        Returns:
+            The state; None while measurements are missing, or no task has begun.
+
+        Raises:
+            InvalidStateError: What is measured cannot be.
+        """
+        return None if self._servo is None else self._assembled(since_s, self._servo.command)
+
+    def _assembled(self, since_s: float, told: HandCommand) -> State | None:
+        if self.newest_joints_s <= since_s or len(self._readings) < 2:
+            return None
+        hand, joints = self._hand(told)
+        motions = [self._motion(body.name) for body in self._model.scene.free]
+        bodies = tuple(motion for motion in motions if motion is not None)
+        if len(bodies) < len(motions):
+            return None
+        held = self._held(hand)
+        if held is not None:
+            bodies = (*bodies[:held], self._carried(held, hand), *bodies[held + 1 :])
+        snapshot = self._index.read(self._template)
+        state = self._index.write(
+            self._template, snapshot._replace(joints=joints, hand=hand, bodies=bodies, held=held)
+        )
+        self._model.reset(state)
+        self._state = state
+        return state
+
+    def _hand(self, told: HandCommand) -> tuple[HandState, Joints]:
+        """The hand and the joints of the newest reading."""
+        newest, earlier = self._readings[-1], self._reading_at(self._readings[-1].stamp_s - RATE_S)
+        if newest.gap is None or earlier.gap is None:
+            raise NoJointStateError("joint states have no positions of the fingers")
+        joints = tuple(possible_joints(newest.joints))
+        passed_s, finger = newest.stamp_s - earlier.stamp_s, 0.5 * newest.gap
+        opening = 0.5 * (newest.gap - earlier.gap) / passed_s
+        rates = newest.velocities or tuple(
+            (b - a) / passed_s for a, b in zip(earlier.joints, newest.joints, strict=True)
+        )
+        hand = moving_hand(joints, rates, (finger, finger), (opening, opening), told)
+        return hand, joints
+
+    def _reading_at(self, stamp_s: float) -> JointReading:
+        """The last reading before a time, or else the first that is known, never the newest."""
+        before = [one for one in list(self._readings)[:-1] if one.stamp_s <= stamp_s]
+        return before[-1] if before else self._readings[0]
+
+    def _motion(self, name: str) -> BodyState | None:
+        """How a body lies or moves; None as long as it was not detected often enough."""
+        found = self._detected.tracks[self._object(name)].newest_motion()
+        return None if found is None else BodyState(found.pose, found.velocity, found.spin)
+
+    def _held(self, hand: HandState) -> int | None:
+        """Index of the body that fingers stand around which were told to close."""
+        if not hand.closing or max(map(abs, hand.finger_velocities)) > STANDING:
+            return None
+        pads = [box.grown(GRASP_GAP) for box in hand.boxes() if box.half == PAD.half_extents_m]
+        for i, body in enumerate(self._model.scene.free):
+            pose = self._carried(i, hand).pose
+            parts = [part.bounding_box.at(pose) for part in body.parts]
+            if all(share_space([pad], parts) for pad in pads):
+                return i
+        return None
+
+    def _carried(self, index: int, hand: HandState) -> BodyState:
+        """A body that has gone with the hand since it was detected."""
+        seen = self._detected.tracks[self._object(self._model.scene.free[index].name)].newest
+        then = grasp_pose(self._reading_at(seen.stamp_s).joints)
+        pose = hand.pose.compose(then.inverse().compose(seen.pose))
+        (x, y, z), (px, py, pz) = hand.pose.position, pose.position
+        turned = cross(hand.angular_velocity, (px - x, py - y, pz - z))
+        vx, vy, vz = (a + b for a, b in zip(hand.velocity, turned, strict=True))
+        return BodyState(pose, (vx, vy, vz), hand.angular_velocity)
+
+    def _object(self, name: str) -> Object:
+        return self._template.layout.object(name)
+
+    # -- commands -------------------------------------------------------------------------------
+
+    def plan_command(self, action: Action) -> ServoCommand:
+        """The command of an action, from where the hand is now.
+
+        Args:
+            action: Action of the contact world.
+
+        Raises:
+            InvalidCommandError: The action is not in the action space.
+            UnsafeCommandError: The fingertips would leave the workspace.
+            InvalidStateError: No task has begun.
+        """
+        with suppress(InvalidStateError):  # then from where it was when a state was measured last
+            self.measure(-math.inf)
+        if self._servo is None or self._state is None:
+            raise InvalidStateError("nothing is measured yet")
+        return self._servo.act(self._state, action)
+
+    def close(self) -> None:
+        """Release the model's resources."""
+        self._model.close()

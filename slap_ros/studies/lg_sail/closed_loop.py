@@ -1,0 +1,324 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Acquired skills that act on what is measured on a robot in another physics, at 20 Hz."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.left_out import Tell
+from slap_ros.api.opening import open_chosen
+from slap_ros.core import task_with_goal
+from slap_ros.domains import get_domain
+from slap_ros.errors import ErrorCode, InvalidParameterError
+from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.experiment import Trial, solve
+from slap_ros.evaluation.summary import format_spread
+from slap_ros.planning.execution import MAX_REPLANS
+from slap_ros.planning.planner import make_planner
+from slap_ros.robot.mujoco.installed import require_mujoco
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.studies.comparison import not_solved
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.lg_sail.domain_choices import (
+    GoalNames,
+    LibraryTasks,
+    all_goals,
+    library_origin,
+    shipped_skills,
+    with_demonstrator,
+)
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
+from slap_ros.studies.replanned_trials import ReplannedTrials
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.robot_trials import solve_on_robot
+from slap_ros.studies.row_figures import name_rows, plot_interval, plot_whole
+from slap_ros.studies.study import PreparedStudy, Study
+from slap_ros.worlds.contact.features import ROBOT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+OWN = "contact world"
+MEASURED = f"""\
+Each task is planned in the contact world, whose hand acts by forces, and executed by a Panda in
+MuJoCo in closed loop. In each control period (0.05 s) the skill acts on the measured state, and its
+command replaces the one before: the arm's joints are pulled to where the contact world would pull
+its hand. Nothing waits for the arm to arrive or for fingers to close. The measured state has the
+joints, the hand's pose and velocity that follow from them, fingers, exact poses and velocities of
+things, what both fingers press on, and where the hand was told to be. Where a skill does not end as
+planned, the planner plans again from the measured state, {MAX_REPLANS} times at most. The plant
+knows nothing of the plan: nothing is welded, and no pose is put right. *Arm* is how many times as
+stiff as the usual arm of `slap run --world mujoco` its joints are (500 to 1100 Nm/rad), with the
+torques of a Panda; the first row of each choice of skills is the contact world itself. A joint in
+motion is behind its command by `lag`, whatever its stiffness; the contact world's hand is by 15 ms.
+*Solved* is the share of the tasks whose goal holds in the measured state, with Wilson's 95 %
+interval. Steps are control periods, over solved tasks; replans are over all tasks; both are
+mean ± sample standard deviation. *Not solved* counts the others by error code. Skills are named by
+what proposed their operators, what made their rewards, and the seed of their training; nothing was
+trained again. The demonstrator's scripts know the whole state. The hands differ as they do
+[open loop](../mujoco.md#open-loop-at-a-bench); the Panda's fingers take three times as long to
+close."""
+COLUMNS = ("goal", "skills", "arm", "solved", "steps", "replans", "not solved")
+
+
+@dataclass(frozen=True)
+class MeasuredLoop:
+    """What a task is solved with, made again in the process that solves it.
+
+    Args:
+        choice: Domain with the skills to plan with.
+        goal: Name of the goal; empty for the task's own.
+        stiffness: How many times as stiff as usual the arm's joints are; None for no arm: the
+            contact world itself.
+        lag_s: Time by which a joint in motion is behind its command, s.
+    """
+
+    choice: DomainChoice
+    goal: str
+    stiffness: float | None
+    lag_s: float
+
+
+def solve_in_loop(loop: MeasuredLoop, seed: int, index: int) -> Trial:
+    """Plan for a task, and execute the plan in closed loop.
+
+    Args:
+        loop: What it is solved with.
+        seed: Seed of the task.
+        index: Index of the task among those of its seed.
+
+    Returns:
+        What came of it.
+    """
+    domain = open_domain(replace(loop.choice, measured=loop.stiffness is not None))
+    task = task_with_goal(domain, seed, index, loop.goal or None)
+    if loop.stiffness is None:
+        return Trial.of(seed, index, solve(domain, task, PURE_PLANNING))
+    from slap_ros.robot.mujoco.arm import ArmMotors  # needs an extra
+    from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld
+
+    motors = ArmMotors(loop.stiffness, loop.lag_s)
+    return solve_on_robot(
+        domain,
+        task,
+        lambda domain, state: make_planner("lazy", domain, state),
+        lambda domain, state: ContactLoopWorld(domain, state, motors),
+    )
+
+
+def arm_in_words(stiffness: float | None) -> str:
+    """The arm by its stiffness, or what is in its place."""
+    return OWN if stiffness is None else f"× {stiffness:g}"
+
+
+@dataclass(frozen=True)
+class LoopRow:
+    """Tasks of a goal, solved with the same skills by the same arm.
+
+    Args:
+        loop: What they were solved with.
+        skills: Name of the skills.
+        trials: Trials, one per task.
+    """
+
+    loop: MeasuredLoop
+    skills: str
+    trials: tuple[Trial, ...]
+
+    @property
+    def arm(self) -> str:
+        """The arm in words."""
+        return arm_in_words(self.loop.stiffness)
+
+    @property
+    def figures(self) -> ReplannedTrials:
+        """Success, length and replans."""
+        return ReplannedTrials(self.trials)
+
+    @property
+    def failures(self) -> Counter[str]:
+        """Tasks that were not solved, by the name of their error code."""
+        failed = [trial for trial in self.trials if not trial.success]
+        return Counter(ErrorCode(trial.error_code).name for trial in failed)
+
+    def as_json(self) -> dict[str, Any]:
+        """The summary, and every trial."""
+        return {
+            "goal": self.loop.goal,
+            "skills": self.skills,
+            "library": self.loop.choice.digest,
+            "stiffness": self.loop.stiffness,
+            **self.figures.as_json(),
+            "failures": dict(self.failures),
+            "trials": [trial.as_json() for trial in self.trials],
+        }
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        figures = self.figures
+        failures = [f"`{name}` {count}" for name, count in self.failures.most_common()]
+        return [
+            self.loop.goal or "(the task's own)",
+            self.skills,
+            self.arm,
+            f"{figures.solved.successes} of {figures.solved.trials} ({figures.solved})",
+            format_spread(figures.length, 0),
+            format_spread(figures.replans, 1),
+            ", ".join(failures) or "none",
+        ]
+
+
+def study(
+    loops: Mapping[str, Sequence[MeasuredLoop]], tasks: int, seed: int, runner: JobRunner
+) -> StudyReport:
+    """Solve the tasks of every goal in closed loop.
+
+    Args:
+        loops: What tasks are solved with, by the name of the skills.
+        tasks: Number of tasks per goal, choice of skills and arm.
+        seed: Seed of the tasks.
+        runner: Runner of the jobs.
+
+    Returns:
+        The report.
+    """
+    rows = [
+        _solved(loop, skills, range(tasks), seed, runner)
+        for skills, some in loops.items()
+        for loop in some
+    ]
+    return StudyReport(
+        study="closed_loop",
+        source="",
+        title=f"Closed loop in another physics: {rows[0].loop.choice.name}",
+        measured=MEASURED,
+        table=MarkdownTable(COLUMNS, [row.as_row() for row in rows]),
+        found={"rows": [row.as_json() for row in rows]},
+        draw=lambda figure: draw(figure, rows),
+        size=(7.0, 1.4 + 0.3 * len(rows)),
+    )
+
+
+def _solved(
+    loop: MeasuredLoop, skills: str, indices: Iterable[int], seed: int, runner: JobRunner
+) -> LoopRow:
+    """What comes of a goal's tasks with some skills and an arm."""
+    what = f"{loop.goal or loop.choice.name}, {skills}, {arm_in_words(loop.stiffness)}"
+    jobs = {f"{what}: task {i}": (loop, seed, i) for i in indices}
+    trials = runner.run(what, solve_in_loop, Trial.from_json, jobs, failure=not_solved)
+    return LoopRow(loop, skills, tuple(trials.values()))
+
+
+def draw(figure: Figure, rows: Sequence[LoopRow]) -> None:
+    """Draw the share of solved tasks with its interval, row by row."""
+    axes = figure.subplots()
+    for place, row in enumerate(rows):
+        solved = row.figures.solved
+        plot_interval(axes, place, solved.interval)
+        plot_whole(axes, place, 100 * solved.share)
+    name_rows(axes, [f"{one.loop.goal or 'own goal'}: {one.skills}, {one.arm}" for one in rows])
+    axes.set_xlim(-3, 103)
+    axes.set_xlabel("solved in closed loop [%], with 95 % interval")
+
+
+def _summary(found: Data) -> str:
+    """Solved tasks by arm, for every choice of skills at the first goal."""
+    first = found["rows"][0]["goal"]
+    words: dict[str, list[str]] = {}
+    for row in (row for row in found["rows"] if row["goal"] == first):
+        arm = arm_in_words(row["stiffness"])
+        solved = sum(trial["success"] for trial in row["trials"])
+        words.setdefault(row["skills"], []).append(f"{arm} {solved} of {len(row['trials'])}")
+    return "; ".join(f"{skills}: {', '.join(arms)}" for skills, arms in words.items())
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoopOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    library: Annotated[
+        list[Path] | None,
+        CommandOption(
+            "Folder that `slap acquire` made. May be repeated. Default: the one that ships.",
+            metavar="FOLDER",
+            name="--library",
+        ),
+    ] = None
+    goal: GoalNames = None
+    stiffness: Annotated[
+        list[float] | None,
+        CommandOption(
+            "Stiffness of the arm's joints, as a factor. May be repeated. Default: 1, 4 and 10."
+        ),
+    ] = None
+    lag: Annotated[
+        float, CommandOption("Time by which a joint in motion is behind its command, in s.")
+    ] = 0.07
+    tasks: LibraryTasks = 10
+    seed: FreshSeed = FRESH_SEED
+    preset: Preset = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: ClosedLoopOptions, tell: Tell) -> PreparedStudy:
+    """Open the domain with each library and with its demonstrator; choose goals and arms.
+
+    Raises:
+        InvalidParameterError: MuJoCo is not installed, there is no such arm, or the domain has no
+            hand that acts by forces.
+    """
+    require_mujoco()
+    from slap_ros.robot.mujoco.arm import ArmMotors  # needs an extra
+
+    domain = get_domain(options.domain, options.preset)
+    if ROBOT not in domain.types:
+        raise InvalidParameterError(
+            f"{options.domain} has no hand that acts by forces; `slap study transfer "
+            f"{options.domain}` is its closed loop"
+        )
+    stiffness = options.stiffness or [1.0, 4.0, 10.0]
+    for factor in stiffness:
+        ArmMotors(factor, options.lag)
+    choices = {DEMONSTRATOR: with_demonstrator(options.domain, domain.preset)}
+    for folder in options.library or shipped_skills(options.domain)[:1]:
+        choice = DomainChoice(options.domain, domain.preset, str(folder))
+        choices[library_origin(choice)] = DomainChoice.of(open_chosen(choice, tell), choice.skills)
+    goals = options.goal or all_goals(domain)
+    loops = {
+        skills: [
+            MeasuredLoop(choice, goal, factor, options.lag)
+            for goal in goals
+            for factor in (None, *stiffness)
+        ]
+        for skills, choice in reversed(choices.items())
+    }
+    return PreparedStudy(
+        {
+            "preset": domain.preset,
+            "stiffness": stiffness,
+            "lag": options.lag,
+            "tasks": options.tasks,
+            "seed": options.seed,
+        },
+        lambda runner: study(loops, options.tasks, options.seed, runner),
+        {"library": options.library, "goal": options.goal},
+    )
+
+
+STUDY = Study(
+    "closed_loop",
+    help="Acquired skills in closed loop on a robot in MuJoCo that is commanded as it moves.",
+    example="slap study closed_loop stack_at_target",
+    options=ClosedLoopOptions,
+    prepare=prepare,
+    summary=_summary,
+    costs="planning and simulation",
+)

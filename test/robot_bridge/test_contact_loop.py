@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Skills at a bench that act on what is measured on the robot in MuJoCo, while it moves."""
+
+import math
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidCommandError, InvalidParameterError, InvalidStateError
+from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.experiment import solve
+from slap_ros.planning.planner import make_planner
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.studies.robot_trials import solve_on_robot
+from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.snapshot import ContactIndex
+from slap_ros.worlds.panda import grasp_pose
+
+pytest.importorskip("pybullet")
+pytest.importorskip("mujoco")
+
+from slap_ros.robot.mujoco.arm import ARM_JOINTS, STIFFNESS, TORQUE, ArmMotors, arm_spec
+from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld
+from slap_ros.robot.mujoco.model import scene_around
+
+SEED = 300
+AHEAD = np.array([0.02, 0.0, 0.0, 0.0, 0.0])  # m, m, m, rad, 1
+CLOSE = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+STAY = np.zeros(5)
+STIFF = ArmMotors(stiffness=10.0, lag_s=0.015)  # the lag of the contact world's own hand
+
+
+@pytest.fixture(scope="module")
+def domain():
+    """Stack at Target with the demonstrator's scripts, whose states are measured."""
+    return open_domain(DomainChoice("stack_at_target", skills=DEMONSTRATOR, measured=True))
+
+
+def loop_world(domain, motors=None):
+    return ContactLoopWorld(domain, domain.task(SEED).initial_state, motors)
+
+
+def snapshot(world, domain):
+    scene = scene_around(domain, world.state)
+    return ContactIndex.of(scene, world.state.layout).read(world.state)
+
+
+def test_a_state_is_what_the_plant_has_and_what_the_hand_was_told(domain):
+    """The arm is still on its way: what was told is ahead of what is measured."""
+    world = loop_world(domain)
+    begun = snapshot(world, domain).hand
+    for _ in range(3):
+        world.step(AHEAD + CLOSE)
+    plant, now = world.plant, snapshot(world, domain)
+    assert list(now.joints) == plant.joints
+    assert now.hand.pose == grasp_pose(plant.joints)
+    assert now.hand.fingers == pytest.approx(plant.fingers, abs=1e-9)
+    assert now.hand.closing and not begun.closing
+    for body, name in zip(now.bodies, plant.poses(), strict=True):
+        assert body == plant.motions()[name]
+    assert now.hand.target[1:] == begun.target[1:]
+    assert begun.target[0] + 0.03 < now.hand.target[0] <= begun.target[0] + 0.06
+    assert 0.01 < now.hand.target[0] - now.hand.pose.position[0] < 0.03  # it lags, on its leash
+    before, after = now.hand, snapshot_after(world, domain, STAY)
+    moved = np.subtract(after.pose.position, before.pose.position) / 0.05
+    fastest, slowest = before.velocity[0], after.velocity[0]
+    assert 0.0 < min(fastest, slowest) < moved[0] * 1.2 and moved[0] < max(fastest, slowest) * 1.2
+
+
+def snapshot_after(world, domain, action):
+    world.step(action)
+    return snapshot(world, domain).hand
+
+
+def test_a_command_replaces_the_one_before_on_the_way(domain):
+    """Nothing waits: each step takes a control period, and the arm turns round within the next."""
+    world = loop_world(domain)
+    began_s = world.plant.time_s
+    for _ in range(4):
+        world.step(AHEAD)
+    assert world.plant.time_s - began_s == pytest.approx(4 * 0.05)
+    assert snapshot(world, domain).hand.velocity[0] > 0.1
+    for _ in range(4):
+        world.step(-AHEAD)
+    assert snapshot(world, domain).hand.velocity[0] < 0.0
+
+
+def test_fingers_close_while_the_arm_moves(domain):
+    world = loop_world(domain)
+    world.step(AHEAD + CLOSE)
+    hand = snapshot(world, domain).hand
+    assert hand.velocity[0] > 0.05
+    assert all(-0.06 < velocity < -0.04 for velocity in hand.finger_velocities)  # Franka's speed
+
+
+def test_a_stiffer_arm_lags_less_and_has_a_pandas_torques(domain):
+    behind = []
+    for motors in (None, STIFF):
+        world = loop_world(domain, motors)
+        for _ in range(3):
+            world.step(AHEAD)
+        hand = snapshot(world, domain).hand
+        behind.append(hand.target[0] - hand.pose.position[0])
+    assert behind[1] < 0.5 * behind[0]
+    usual, stiff = arm_spec().compile(), arm_spec(STIFF).compile()
+    for i, name in enumerate(ARM_JOINTS):
+        soft, hard = usual.actuator(name), stiff.actuator(name)
+        assert (soft.gainprm[0], hard.gainprm[0]) == (STIFFNESS[i], 10.0 * STIFFNESS[i])
+        assert -hard.biasprm[2] == pytest.approx(STIFF.lag_s * hard.gainprm[0])
+        assert soft.forcerange.tolist() == hard.forcerange.tolist() == [-TORQUE[i], TORQUE[i]]
+
+
+def test_the_same_actions_give_the_same_states_to_the_bit(domain):
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (12, 5)) * [0.02, 0.02, 0.02, 0.15, 1.0]
+    states = []
+    for _ in range(2):
+        world = loop_world(domain)
+        states.append([world.step(action).data.tobytes() for action in actions])
+    assert states[0] == states[1]
+
+
+def solved(domain, motors, seed=SEED):
+    return solve_on_robot(
+        domain,
+        domain.task(seed),
+        lambda domain, state: make_planner("lazy", domain, state),
+        lambda domain, state: ContactLoopWorld(domain, state, motors),
+    )
+
+
+def test_scripts_stack_with_a_stiff_arm_as_they_do_in_the_contact_world(domain):
+    """With the lag of the contact world's own hand; fingers alone are slower."""
+    trial = solved(domain, STIFF)
+    assert trial.success
+    assert not trial.replans
+    own = solve(domain, domain.task(SEED), PURE_PLANNING)
+    assert [edge.option for edge in trial.edges] == [edge.option for edge in own.edges]
+    assert own.plan_length < trial.plan_length < 1.5 * own.plan_length
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    """Stack at Target with the skills that ship."""
+    return open_domain(DomainChoice("stack_at_target", measured=True))
+
+
+def test_skills_that_ship_stack_by_what_is_measured(shipped):
+    first, again = (solved(shipped, ArmMotors(stiffness=4.0), SEED + 4) for _ in range(2))
+    assert first.success
+    assert first.plan_length == again.plan_length
+    assert first.edges == again.edges
+
+
+def test_a_cube_that_is_moved_meanwhile_is_grasped_where_it_is(shipped):
+    """A recording would close the hand around nothing: a skill in closed loop looks."""
+    world = ContactLoopWorld(shipped, shipped.task(SEED).initial_state, ArmMotors(4.0))
+    cube, plant = world.state.layout.object("cube0"), world.plant
+    policy = shipped.skills["Pick"].start(world.state, (cube,))
+    for step in range(80):
+        if step == 10:
+            plant._data.qpos[plant._model.joint("cube0").qposadr[0] + 1] += 0.03  # m
+        action = policy(world.state)
+        if action is None or world.state.get(cube, "z") > 0.06:
+            break
+        world.step(action)
+    assert world.state.get(cube, "held") == 1.0
+    assert plant.grasped() == "cube0"
+
+
+def test_what_is_no_action_moves_nothing(domain):
+    world = loop_world(domain)
+    before = world.plant.save()
+    with pytest.raises(InvalidCommandError):
+        world.step(np.array([0.5, 0.0, 0.0, 0.0, 0.0]))
+    assert np.array_equal(world.plant.save(), before)
+    assert not snapshot(world, domain).hand.closing
+    with pytest.raises(InvalidStateError, match="cannot be put"):
+        world.reset(world.state)
+
+
+def test_a_hand_at_the_end_of_its_reach_stands(domain):
+    """A target out of reach is refused by the servo as by the contact world."""
+    world = loop_world(domain)
+    for _ in range(120):
+        world.step(AHEAD)
+    hand = snapshot(world, domain).hand
+    assert math.hypot(*hand.velocity) < 0.01
+    assert math.dist(hand.target, hand.pose.position) < 0.005
+    world.state.require_finite()
+    domain.make_world(world.state).close()  # the planner's world takes it
+
+
+def test_what_the_loop_is_not_for_is_named():
+    tower = get_domain("obstacle_tower")
+    with pytest.raises(InvalidParameterError, match="ClosedLoopWorld"):
+        ContactLoopWorld(tower, tower.task(1).initial_state)
+    with pytest.raises(InvalidParameterError, match="stiffness"):
+        ArmMotors(stiffness=0.0)
+    with pytest.raises(InvalidParameterError, match="lag_s"):
+        ArmMotors(lag_s=math.nan)
+    assert ROBOT not in tower.types

@@ -1,0 +1,223 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""States at a bench from encoders and late detections, while the arm moves."""
+
+import math
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import (
+    InvalidCommandError,
+    InvalidMeasurementError,
+    InvalidParameterError,
+    InvalidSceneError,
+    InvalidStateError,
+    UnsafeCommandError,
+)
+from slap_ros.geometry.pose import IDENTITY, Pose
+from slap_ros.planning.execution import Executor
+from slap_ros.planning.planner import make_planner
+from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.limits import Workspace
+from slap_ros.robot.scene_config import sampled_scene_config
+from slap_ros.robot.servoed_robot import ServoedRobot, require_servoed
+from slap_ros.robot.tracking import TrackingSettings
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.worlds.contact.features import ROBOT
+
+pytest.importorskip("pybullet")
+pytest.importorskip("mujoco")
+
+from slap_ros.robot.mujoco.model import scene_around
+from slap_ros.robot.mujoco.plant import PERIOD_S, MujocoPlant
+from slap_ros.robot.mujoco.plant_controllers import REACH, UNCHECKED, PlantControllers
+
+SEED = 300
+RATE_S, LATE_S, JOINTS_S = 1 / 30, 0.02, 0.01  # as of the node in MuJoCo
+EXACT = TrackingSettings(position_noise_m=0.0005, turn_noise_rad=0.005)
+DOWN = np.array([0.0, 0.0, -0.02, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def domain():
+    """Stack at Target with the demonstrator's scripts, whose states are measured."""
+    return open_domain(DomainChoice("stack_at_target", skills=DEMONSTRATOR, measured=True))
+
+
+class MeasuredPlant:
+    """A plant that is measured as the nodes do it: joints at 100 Hz, things at 30 Hz and late."""
+
+    def __init__(self, domain, workspace=REACH, pace=1.0):
+        initial = domain.task(SEED).initial_state
+        self.plant, self.pace = MujocoPlant.of(domain, initial), pace
+        scene = scene_around(domain, initial)
+        self.robot = ServoedRobot(domain, sampled_scene_config(initial), workspace, EXACT, pace)
+        self._controllers = PlantControllers(
+            self.plant, UNCHECKED, scene.forces.grip_n, self._watch
+        )
+        self._joints_s = self._seen_s = -1.0
+        self._pending = []
+        began_s = self.now_s
+        while (state := self.robot.begin(began_s)) is None:
+            self._controllers.pass_period()
+        self.state = state
+
+    @property
+    def now_s(self):
+        """Time on the clock by which measurements are stamped."""
+        return self.plant.time_s / self.pace
+
+    def reset(self, state):
+        raise NotImplementedError
+
+    def step(self, action):
+        command = self.robot.plan_command(action)
+        if command.gripper is not GripperAction.KEEP:
+            closes = command.gripper is GripperAction.CLOSE
+            self._controllers.command_fingers(GAP_SHUT if closes else GAP_OPEN)
+        self._controllers.replace_motion(command.points)
+        for _ in range(round(0.05 / PERIOD_S)):
+            self._controllers.pass_period()
+        self.state = self.robot.measure(-math.inf)
+        return self.state
+
+    def _watch(self):
+        plant, now_s = self.plant, self.plant.time_s
+        if now_s - self._joints_s >= JOINTS_S - 1e-9:
+            self._joints_s = now_s
+            joints, speeds = tuple(plant.joints), tuple(plant.joint_velocities)
+            self.robot.add_joint_reading(JointReading(self.now_s, joints, speeds, plant.gap))
+        if now_s - self._seen_s >= RATE_S - 1e-9:
+            self._seen_s = now_s
+            self._pending.append((now_s + LATE_S, self.now_s, plant.poses()))
+        while self._pending and self._pending[0][0] <= now_s:
+            _, stamp_s, poses = self._pending.pop(0)
+            for name, pose in poses.items():
+                self.robot.add_detection(f"detected_{name}", stamp_s, IDENTITY, pose)
+
+
+@pytest.fixture(scope="module")
+def run(domain):
+    """Two cubes stacked by what was measured, and how far off each state was from the plant."""
+    world, off, held = MeasuredPlant(domain), [], []
+    step = world.step
+
+    def compared(action):
+        state = step(action)
+        named = [o for o in state.objects if "held" in o.type.column]
+        carried = [o.name for o in named if state.get(o, "held") > 0.5]
+        held.append(([world.plant.grasped()] if world.plant.grasped() else [], carried))
+        for obj in named:
+            if obj.name in carried:
+                at = [float(state.get(obj, axis)) for axis in "xyz"]
+                off.append(math.dist(at, world.plant.poses()[obj.name].position))
+        return state
+
+    world.step = compared
+    task, space = domain.task(SEED), domain.atom_space(world.state)
+    goal = space.mask(task.goal)
+    planner = make_planner("lazy", domain, world.state)
+    episode = Executor(domain, planner, world, space, goal, task.step_limit).run()
+    return episode, off, held, world
+
+
+def test_a_stack_is_built_by_late_detections(run, domain):
+    episode, _, _, world = run
+    assert episode.success, episode.error
+    on, under = (world.plant.poses()[name].position for name in ("cube1", "cube0"))
+    assert on[:2] == pytest.approx(under[:2], abs=0.01)
+    assert on[2] - under[2] == pytest.approx(0.04, abs=0.002)
+
+
+def test_what_is_held_is_where_the_hand_has_it_though_detections_are_old(run):
+    """A hand at 0.3 m/s goes 16 mm while a detection is due and late."""
+    _, off, _, _ = run
+    assert len(off) > 40
+    assert max(off) < 0.006
+    assert sorted(off)[len(off) // 2] < 0.002
+
+
+def test_what_both_fingers_press_on_is_held_and_nothing_else(run):
+    _, _, held, _ = run
+    differ = sum(pressed != carried for pressed, carried in held)
+    assert differ <= 6  # steps in which fingers meet a cube, or let go of it
+    assert {tuple(carried) for _, carried in held} == {(), ("cube0",), ("cube1",)}
+
+
+def test_a_thing_has_the_velocity_of_its_last_detections(domain):
+    world = MeasuredPlant(domain)
+    robot, state = world.robot, world.state
+    cube = state.layout.object("cube0")
+    assert [float(state.get(cube, f"v{axis}")) for axis in "xyz"] == [0.0, 0.0, 0.0]
+    at, stamp_s = world.plant.poses()["cube0"], world.now_s
+    x, y, z = at.position
+    for i in range(1, 4):
+        seen = Pose((x, y - 0.01 * i, z), at.quaternion)
+        robot.add_detection("detected_cube0", stamp_s + 0.1 * i, IDENTITY, seen)
+    moved = robot.measure(-math.inf)
+    velocity = [float(moved.get(cube, f"v{axis}")) for axis in "xyz"]
+    assert velocity == pytest.approx([0.0, -0.1, 0.0])
+    assert float(moved.get(cube, "y")) == pytest.approx(y - 0.03)
+
+
+def test_time_that_passes_faster_is_taken_into_account(domain):
+    velocities = []
+    for pace in (1.0, 5.0):
+        world = MeasuredPlant(domain, pace=pace)
+        for _ in range(4):
+            world.step(-DOWN)
+        (robot,) = world.state.layout.of_type(ROBOT)
+        velocities.append(float(world.state.get(robot, "vz")))
+        assert world.robot.newest_joints_s == pytest.approx(world.now_s, abs=0.011)
+    assert velocities[0] == pytest.approx(velocities[1])
+    assert velocities[0] > 0.1
+
+
+def test_what_is_unsafe_is_refused_and_commands_nothing(domain):
+    world = MeasuredPlant(domain, Workspace((0.2, -0.5, 0.15), (0.8, 0.5, 0.9)))
+    lowest = 1.0
+    with pytest.raises(UnsafeCommandError, match=r"z = 0\.1"):
+        for _ in range(50):
+            world.step(DOWN)
+            (robot,) = world.state.layout.of_type(ROBOT)
+            lowest = float(world.state.get(robot, "target_z"))
+    assert lowest >= 0.15 - 1e-9
+    with pytest.raises(InvalidCommandError):
+        world.robot.plan_command(10.0 * DOWN)
+    (robot,) = world.robot.measure(-math.inf).layout.of_type(ROBOT)
+    assert float(world.robot.measure(-math.inf).get(robot, "target_z")) == lowest
+
+
+def test_what_is_not_measured_gives_no_state(domain):
+    initial = domain.task(SEED).initial_state
+    robot = ServoedRobot(domain, sampled_scene_config(initial), REACH, EXACT)
+    plant = MujocoPlant.of(domain, initial)
+    assert robot.begin(0.0) is None
+    assert robot.undetected(0.0) == ["cube0", "cube1"]
+    for i in range(1, 5):
+        for name, pose in plant.poses().items():
+            robot.add_detection(f"detected_{name}", 0.1 * i, IDENTITY, pose)
+        moving = (0.3,) * 7
+        reading = JointReading(0.1 * i, tuple(plant.joints), moving, plant.gap)
+        robot.add_joint_reading(reading)
+    assert robot.begin(0.0) is None  # the arm moves
+    with pytest.raises(InvalidStateError, match="nothing is measured"):
+        robot.plan_command(DOWN)
+    with pytest.raises(InvalidMeasurementError, match="not newer"):
+        robot.add_joint_reading(reading)
+    with pytest.raises(InvalidMeasurementError, match="are positions in m"):
+        robot.add_detection("detected_cube0", 1.0, IDENTITY, Pose((500.0, 0.0, 20.0)))
+
+
+def test_where_something_slides_or_there_is_no_hand_is_named():
+    drawers = get_domain("stow_hammer")
+    state = drawers.task(1).initial_state
+    with pytest.raises(InvalidSceneError, match="how far cabinet0 is open"):
+        require_servoed(drawers, state)
+    tower = get_domain("obstacle_tower")
+    config = sampled_scene_config(tower.task(1).initial_state)
+    with pytest.raises(InvalidParameterError, match="no hand that acts by forces"):
+        ServoedRobot(tower, config, REACH, EXACT)
