@@ -18,7 +18,6 @@ from slap_ros.robot.franka.limits import JERK, franka_limits
 from slap_ros.robot.limits import FR3, Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.worlds.contact.scene import HandForces
 from slap_ros.worlds.panda import JOINTS
 
 # As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
@@ -30,10 +29,8 @@ GRIPPER_ACTION = "franka_gripper/gripper_action"
 BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
     {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 70.0}
 )
-# At a bench fingers press as hard as those of the contact world.
-BEFORE_MUJOCO_AT_A_BENCH = MappingProxyType(
-    {**BEFORE_MUJOCO, "gripper_effort": HandForces().grip_n}
-)
+# At a bench fingers press as hard as those of the contact world (``HandForces``).
+BEFORE_MUJOCO_AT_A_BENCH = MappingProxyType({**BEFORE_MUJOCO, "gripper_effort": 40.0})
 Parameters = Mapping[str, str | int | float | tuple[float, ...]]
 WORKSPACE = (*Workspace().low, *Workspace().high)
 BENCH = (0.2, -0.5, 0.0, 0.8, 0.5, 0.9)  # m: tables at a bench are as high as the arm's base
