@@ -70,6 +70,8 @@ class PublishedFigure:
             seeds = f"{data['seeds']} × " if "seeds" in data else ""
             tasks = f", {seeds}{data['tasks']} tasks" if "tasks" in data else ""
             return f"{trained} training{'s' if trained != 1 else ''}{tasks}"
+        if "candidates" in data:
+            return f"{data['candidates']} candidates"
         if "starts" in data:
             return f"{data['starts']} starts"
         if "trials" in data:
