@@ -4,6 +4,7 @@
 
 import json
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -61,3 +62,24 @@ def test_the_contact_world_and_each_arm_have_a_row_for_all_skills(tmp_path):
     page = (tmp_path / "closed_loop_stack_at_target.md").read_text()
     assert "| training | demonstrator | × 4 | 1 of 1 " in page
     assert "| training | demonstrator | contact world | 1 of 1 " in page
+
+
+@pytest.mark.slow
+def test_shortcuts_over_skills_have_rows_of_their_own_and_save_steps(tmp_path):
+    join = Path(__file__).parents[2] / "models" / "join"
+    more = ["--preset", "fair:blocked=1", "--goal", "training", "--stiffness", "10"]
+    folders = ["--library", join / "skills", "--shortcuts", join / "shortcuts"]
+    done = study("stack_at_target", tmp_path, *more, *folders)
+    assert done.exit_code == 0, done.stderr
+    data = json.loads((tmp_path / "closed_loop_stack_at_target.json").read_text())
+    skills, _, slap_, *_ = (row["trials"][0] for row in data["found"]["rows"])
+    assert skills["success"] and slap_["success"]
+    assert slap_["plan_length"] < skills["plan_length"]
+    assert f"--shortcuts {join / 'shortcuts'}" in data["command"]
+
+
+def test_shortcuts_over_other_skills_are_refused(tmp_path):
+    shortcuts = Path(__file__).parents[2] / "models" / "join" / "shortcuts"
+    done = study("stack_at_target", tmp_path, "--shortcuts", shortcuts)
+    assert done.exit_code == ErrorCode.SKILLS_CHANGED
+    assert not list(tmp_path.iterdir())

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.left_out import Tell
 from slap_ros.api.opening import open_chosen
+from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.core import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
-from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.evaluation.experiment import Trial, solve
 from slap_ros.evaluation.summary import format_spread
 from slap_ros.planning.execution import MAX_REPLANS
-from slap_ros.planning.planner import make_planner
 from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.studies.comparison import not_solved
@@ -77,12 +77,14 @@ class MeasuredLoop:
         stiffness: How many times as stiff as usual the arm's joints are; None for no arm: the
             contact world itself.
         lag_s: Time by which a joint in motion is behind its command, s.
+        approach: Way to plan: with shortcuts over the skills, or without.
     """
 
     choice: DomainChoice
     goal: str
     stiffness: float | None
     lag_s: float
+    approach: Approach = PURE_PLANNING
 
 
 def solve_in_loop(loop: MeasuredLoop, seed: int, index: int) -> Trial:
@@ -99,7 +101,7 @@ def solve_in_loop(loop: MeasuredLoop, seed: int, index: int) -> Trial:
     domain = open_domain(replace(loop.choice, measured=loop.stiffness is not None))
     task = task_with_goal(domain, seed, index, loop.goal or None)
     if loop.stiffness is None:
-        return Trial.of(seed, index, solve(domain, task, PURE_PLANNING))
+        return Trial.of(seed, index, solve(domain, task, loop.approach))
     from slap_ros.robot.mujoco.arm import ArmMotors  # needs an extra
     from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld
 
@@ -107,7 +109,7 @@ def solve_in_loop(loop: MeasuredLoop, seed: int, index: int) -> Trial:
     return solve_on_robot(
         domain,
         task,
-        lambda domain, state: make_planner("lazy", domain, state),
+        lambda domain, state: loop.approach.planner("lazy", domain, state),
         lambda domain, state: ContactLoopWorld(domain, state, motors),
     )
 
@@ -266,6 +268,30 @@ class ClosedLoopOptions:
     preset: Preset = None
     jobs: Jobs = 1
     output: Output = RESULTS
+    shortcuts: Annotated[
+        Path | None,
+        CommandOption(
+            "Shortcuts over the skills of --library: rows with them stand beside those without.",
+            metavar="FOLDER",
+        ),
+    ] = None
+
+
+def _ways_to_plan(
+    options: ClosedLoopOptions, preset: str, tell: Tell
+) -> dict[str, tuple[DomainChoice, Approach]]:
+    """Skills with their ways to plan, by their name: libraries first, the demonstrator last."""
+    ways: dict[str, tuple[DomainChoice, Approach]] = {}
+    for folder in options.library or shipped_skills(options.domain)[:1]:
+        chosen = DomainChoice(options.domain, preset, str(folder))
+        domain, skills = open_chosen(chosen, tell), library_origin(chosen)
+        choice = DomainChoice.of(domain, chosen.skills)
+        ways[skills] = choice, PURE_PLANNING
+        library = choose_library(options.shortcuts, domain, "lazy", tell)
+        if library is not None:
+            ways[f"{skills}, and shortcuts"] = choice, Approach("slap", library.shortcuts)
+    ways[DEMONSTRATOR] = with_demonstrator(options.domain, preset), PURE_PLANNING
+    return ways
 
 
 def prepare(options: ClosedLoopOptions, tell: Tell) -> PreparedStudy:
@@ -287,18 +313,13 @@ def prepare(options: ClosedLoopOptions, tell: Tell) -> PreparedStudy:
     stiffness = options.stiffness or [1.0, 4.0, 10.0]
     for factor in stiffness:
         ArmMotors(factor, options.lag)
-    choices = {DEMONSTRATOR: with_demonstrator(options.domain, domain.preset)}
-    for folder in options.library or shipped_skills(options.domain)[:1]:
-        choice = DomainChoice(options.domain, domain.preset, str(folder))
-        choices[library_origin(choice)] = DomainChoice.of(open_chosen(choice, tell), choice.skills)
-    goals = options.goal or all_goals(domain)
     loops = {
         skills: [
-            MeasuredLoop(choice, goal, factor, options.lag)
-            for goal in goals
+            MeasuredLoop(choice, goal, factor, options.lag, approach)
+            for goal in options.goal or all_goals(domain)
             for factor in (None, *stiffness)
         ]
-        for skills, choice in reversed(choices.items())
+        for skills, (choice, approach) in _ways_to_plan(options, domain.preset, tell).items()
     }
     return PreparedStudy(
         {
@@ -309,7 +330,7 @@ def prepare(options: ClosedLoopOptions, tell: Tell) -> PreparedStudy:
             "seed": options.seed,
         },
         lambda runner: study(loops, options.tasks, options.seed, runner),
-        {"library": options.library, "goal": options.goal},
+        {"library": options.library, "goal": options.goal, "shortcuts": options.shortcuts},
     )
 
 
