@@ -84,7 +84,7 @@ def _contact_model(domain: Domain, state: State) -> ContactWorld:
         model.close()
         raise InvalidSceneError(
             f"{domain.name} cannot run on a robot: nothing measures how far {jointed[0].name} is "
-            "open; use --world sim"
+            f"open; use --world sim, or `slap study closed_loop {domain.name}`, which knows it"
         )
     return model
 
