@@ -53,6 +53,7 @@ def test_a_parameter_file_goes_before_defaults_and_arguments_before_the_file(cli
         ("world:=moon", "moon"),
         ("camera:=perhaps", "perhaps"),
         ("acquisition:=perhaps", "perhaps"),
+        ("servo:=perhaps", "perhaps"),
         ("rviz:=perhaps", "perhaps"),
         ("seed:=x", "seed must be a whole number"),
     ],

@@ -40,6 +40,10 @@ PATIENT = """
 /**/robot_bridge:
   ros__parameters: {controller_timeout: 60.0, joint_timeout: 60.0, detection_timeout: 60.0}
 """
+PATIENT_AT_A_BENCH = """
+/**/servo_bridge:
+  ros__parameters: {joint_timeout: 60.0, detection_timeout: 60.0}
+"""
 
 
 def test_the_executables_of_the_page_are_there():
@@ -101,6 +105,19 @@ def test_a_launched_robot_in_mujoco_does_what_it_is_asked_for(cli, tmp_path):
     assert evaluate_bag(tmp_path / "bag").runs[-1].plan_length == plan_length
     with pytest.raises(InvalidParameterError, match="its states are measured"):
         replay_bag(tmp_path / "bag")
+
+
+def test_a_launched_robot_at_a_bench_is_commanded_while_it_moves(cli, tmp_path):
+    pytest.importorskip("mujoco")
+    patient = tmp_path / "patient.yaml"
+    patient.write_text(PATIENT_AT_A_BENCH)
+    launch = ["ros2", "launch", "slap_ros", "ensemble.launch.py", "domain:=stack_at_target"]
+    launch += ["seed:=300", "world:=mujoco", "servo:=true", "skills:=demonstrator"]
+    launch += ["goal:=(Holding cube0)", f"record:={tmp_path / 'bag'}", "patience:=5.0"]
+    with started([*launch, f"params_file:={patient}"], tmp_path / "launch.txt"):
+        plan_length = solve()
+        ros2("service", "call", "/slap/close_bag", "std_srvs/srv/Trigger")
+    assert evaluate_bag(tmp_path / "bag").runs[-1].plan_length == plan_length > 20
 
 
 def check_playing(bag):
