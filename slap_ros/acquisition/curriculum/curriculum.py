@@ -39,7 +39,7 @@ from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
 from slap_ros.acquisition.curriculum.final_library import FinalLibrary
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
 from slap_ros.acquisition.curriculum.jobs import LearningJob, horizon_of
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.skill_selection import (
     NO_PROGRESS,
     SkillSelection,

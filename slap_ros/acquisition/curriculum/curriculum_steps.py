@@ -20,7 +20,7 @@ from slap_ros.acquisition.curriculum.curriculum_folder import CurriculumFolder
 from slap_ros.acquisition.curriculum.initiation_states import InitiationRecord
 from slap_ros.acquisition.curriculum.jobs import LearningJob
 from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned, compare
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.acquisition.training.warm_start import WarmStart

@@ -15,7 +15,7 @@ from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
 from slap_ros.acquisition.curriculum.jobs import horizon_of
 from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned
 from slap_ros.acquisition.curriculum.library_record import library_record, skill_record
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.skills_at_hand import SkillsAtHand
 from slap_ros.acquisition.curriculum.task_source import VALIDATION
 from slap_ros.acquisition.training.settings import AcquisitionSettings
