@@ -30,7 +30,8 @@ from slap_ros.planning.corridor import CorridorBuilder
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.ff_planner import FFPlanner
 from slap_ros.planning.graph_planner import GraphPlanner
-from slap_ros.planning.lazy_search import LookAhead, SearchLimits, search_lazily
+from slap_ros.planning.lazy_search import SearchLimits, search_lazily
+from slap_ros.planning.look_ahead import LookAhead
 from slap_ros.planning.model import CountedModel
 from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.planning.plan_proof import PlanProof
