@@ -23,7 +23,7 @@ import torch
 
 from slap_ros.acquisition.curriculum import jobs
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.task_source import VALIDATION, TaskSource
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.core import Domain

@@ -14,7 +14,7 @@ from slap_ros.acquisition.curriculum.curriculum import Curriculum
 from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback, OngoingRound
 from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
 from slap_ros.acquisition.curriculum.jobs import horizon_of
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.proposals.attempt_log import AttemptLog, Entry
 from slap_ros.acquisition.proposals.proposal import Proposal, read_proposal

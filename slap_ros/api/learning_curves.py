@@ -10,7 +10,7 @@ from statistics import fmean
 
 from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback, OngoingRound
 from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.solved_shares import Point, SolvedShares
 from slap_ros.acquisition.training.skill_training import Round
 

@@ -27,6 +27,7 @@ from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.cli.training_options import (
     BeginWith,
+    Events,
     Ray,
     Rewarder,
     TrainingSeed,
@@ -91,10 +92,7 @@ class AcquireOptions:
     jobs: Jobs = 2
     ray: Ray = None
     work: WorkFolder = None
-    events: Annotated[
-        bool,
-        typer.Option("--events", help="Print every event on stdout, as one line of JSON."),
-    ] = False
+    events: Events = False
     json: Json = False
 
     def __post_init__(self) -> None:

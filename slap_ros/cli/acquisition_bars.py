@@ -13,7 +13,7 @@ from rich.progress import BarColumn, TaskID
 
 from slap_ros.acquisition.curriculum.curriculum_callback import OngoingRound
 from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, failed_stages
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout, failed_stages
 from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.cli.acquisition_events import AcquisitionEvents
 from slap_ros.cli.console import console

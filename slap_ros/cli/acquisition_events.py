@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.proposals.attempt_log import Entry
 from slap_ros.acquisition.proposals.proposal import Proposal
 from slap_ros.acquisition.training.skill_training import Round

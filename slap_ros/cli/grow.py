@@ -27,7 +27,7 @@ from slap_ros.cli.options import Goal, Json
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.cli.train import training_bars
-from slap_ros.cli.training_options import BeginWith, Rewarder, TrainingSeed, setting_changes
+from slap_ros.cli.training_options import BeginWith, Events, Rewarder, TrainingSeed, setting_changes
 from slap_ros.shortcuts.named_settings import NEAR
 from slap_ros.shortcuts.training_callback import TrainingCallback
 
@@ -75,10 +75,7 @@ class GrowOptions:
         ),
     ] = STEPS
     jobs: Jobs = 2
-    events: Annotated[
-        bool,
-        typer.Option("--events", help="Print every event on stdout, as one line of JSON."),
-    ] = False
+    events: Events = False
     json: Json = False
 
     def request(self, proposers: ProposerOptions) -> GrowthRequest:

@@ -10,10 +10,9 @@ from pathlib import Path
 from slap_ros.api.planning import plan_task as make_plan
 from slap_ros.api.shortcut_choice import shortcuts_of_option
 from slap_ros.cli.console import console, print_json, print_line, warn
+from slap_ros.cli.outputs import write_files
 from slap_ros.core import Domain, Task
 from slap_ros.drawing import draw_abstract_graph
-from slap_ros.errors import StorageFullError
-from slap_ros.files import write_whole
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.anytime import PlanningInterrupted
 from slap_ros.planning.plan import PlanningResult, bound_as_text
@@ -146,13 +145,9 @@ def _pddl(domain: Domain, operators: Sequence[LiftedOperator], task: Task) -> di
 
 
 def _write(folder: Path, files: Mapping[str, str]) -> None:
-    """Write texts by file name."""
-    try:
-        for name, text in files.items():
-            write_whole(folder / name, text)
-            console.print(f"wrote {folder / name}")
-    except OSError as error:
-        raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
+    """Write texts by file name, and say where."""
+    for path in write_files(folder, files):
+        console.print(f"wrote {path}")
 
 
 def _graph(domain: Domain, task: Task, space: AtomSpace) -> AbstractGraph:

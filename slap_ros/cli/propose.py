@@ -28,12 +28,13 @@ from slap_ros.api.proposing import answer, request_for
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.operators import print_operator
 from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Seed
+from slap_ros.cli.outputs import write_files
 from slap_ros.cli.plan_pddl import read_pddl
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.core import task_with_goal
 from slap_ros.domains import get_domain
-from slap_ros.errors import InvalidParameterError, StorageFullError
-from slap_ros.files import require_writable, write_whole
+from slap_ros.errors import InvalidParameterError
+from slap_ros.files import require_writable
 from slap_ros.relational.pddl import parse_domain, parse_problem
 
 
@@ -165,9 +166,4 @@ def _write(folder: Path, proposal: Proposal, problem: AcquisitionProblem) -> lis
         "problem.pddl": problem_text,
         "proposal.json": proposal.to_json(),
     }
-    try:
-        for name, text in files.items():
-            write_whole(folder / name, text)
-    except OSError as error:
-        raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
-    return [str(folder / name) for name in (*files, "attempts.jsonl")]
+    return list(map(str, [*write_files(folder, files), folder / "attempts.jsonl"]))

@@ -50,9 +50,8 @@ def _moved_descriptor(stream: TextIO) -> Iterator[TextIO]:
     Args:
         stream: Stdout; nothing is moved where it is in memory.
     """
-    try:
-        number, stderr = stream.fileno(), sys.stderr.fileno()
-    except io.UnsupportedOperation:
+    number, stderr = _descriptor(stream), _descriptor(sys.stderr)
+    if number is None or stderr is None:
         yield stream
         return
     stream.flush()
@@ -66,6 +65,14 @@ def _moved_descriptor(stream: TextIO) -> Iterator[TextIO]:
     finally:
         os.dup2(kept, number)
         os.close(kept)
+
+
+def _descriptor(stream: TextIO) -> int | None:
+    """The descriptor of a stream; None for one in memory."""
+    try:
+        return stream.fileno()
+    except io.UnsupportedOperation:
+        return None
 
 
 def open_closed_streams() -> None:

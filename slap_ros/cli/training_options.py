@@ -35,6 +35,9 @@ BeginWith = Annotated[
         "--from", help="Skill library whose skills training may begin from. May be repeated."
     ),
 ]
+Events = Annotated[
+    bool, typer.Option("--events", help="Print every event on stdout, as one line of JSON.")
+]
 
 
 def setting_changes(example: str) -> CommandOption:

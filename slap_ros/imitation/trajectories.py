@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, roll_out
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
+from slap_ros.acquisition.curriculum.rollouts import roll_out
 from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.errors import UnsolvableError

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, carry_out_stage
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout, Stage
+from slap_ros.acquisition.curriculum.rollouts import carry_out_stage
 from slap_ros.core import Domain, Task
 from slap_ros.language.formats import AtomDraft
 from slap_ros.relational import AtomSpace, GroundOperator, LiftedOperator, ground_operators

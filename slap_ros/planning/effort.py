@@ -62,3 +62,11 @@ class Effort:
         usual = cls()
         improve = factor * usual.improve if improve is None else improve
         return cls(factor * usual.rollouts, factor * usual.tests, within, improve)
+
+    def abstract_states(self, operators: int) -> int:
+        """Number of abstract states of a graph that is searched as a whole, at most.
+
+        Args:
+            operators: Number of ground operators.
+        """
+        return self.tests // max(1, operators)

@@ -16,12 +16,13 @@ is as if the edge had been rolled out when it first came to the front.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.failures import Failures
+from slap_ros.planning.look_ahead import LookAhead
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.search import SearchOutcome, Vertex, plan_to, without_plan
@@ -45,38 +46,6 @@ class SearchLimits:
 
 
 UNLIMITED = SearchLimits()
-
-
-@dataclass(frozen=True)
-class LookAhead:
-    """What leads to a goal in a graph: the same for every search in it.
-
-    Args:
-        goals: Indices of the goal nodes.
-        forward: Edges out of each node through which a goal can be reached.
-        steps_to_go: Lower bound of the steps from each node to a goal; None without a way.
-    """
-
-    goals: frozenset[int]
-    forward: Sequence[Sequence[Edge]]
-    steps_to_go: Sequence[int | None]
-
-    @classmethod
-    def of(cls, graph: AbstractGraph) -> LookAhead:
-        """Along all forward edges of a graph."""
-        return cls.along(graph.forward_edges(), frozenset(graph.goal_nodes))
-
-    @classmethod
-    def along(cls, edges: Sequence[Sequence[Edge]], goals: frozenset[int]) -> LookAhead:
-        """Along these edges out of each node, to these goal nodes."""
-        steps_to_go = _steps_to_go(edges, goals)
-        leading = [[e for e in out if steps_to_go[e.target] is not None] for out in edges]
-        return cls(goals, leading, steps_to_go)
-
-    def without_given_up(self) -> LookAhead:
-        """The same without the options that were given up, and the bounds that counted on them."""
-        left = [[e for e in out if not e.option.given_up()] for out in self.forward]
-        return LookAhead.along(left, self.goals)
 
 
 def search_lazily(
@@ -317,27 +286,3 @@ class _LazySearch:
     def _drop_given_up(self, edge: Edge) -> None:
         if edge.option.given_up():
             self._frontier.drop_given_up()
-
-
-def _steps_to_go(edges: Sequence[Sequence[Edge]], goals: Iterable[int]) -> list[int | None]:
-    """Lower bound of the steps from each node to a goal, by Dijkstra; None without a way.
-
-    Args:
-        edges: Edges out of each node.
-        goals: Indices of the goal nodes.
-    """
-    into: list[list[tuple[int, int]]] = [[] for _ in edges]
-    for out in edges:
-        for edge in out:
-            into[edge.target].append((edge.source, edge.option.skill.least_steps))
-    h: list[int | None] = [None] * len(edges)
-    queue = [(0, goal) for goal in sorted(goals)]
-    while queue:
-        steps, node = heapq.heappop(queue)
-        if h[node] is not None:
-            continue
-        h[node] = steps
-        for source, least_steps in into[node]:
-            if h[source] is None:
-                heapq.heappush(queue, (steps + least_steps, source))
-    return h

@@ -26,11 +26,8 @@ from slap_ros.relational import State
 from slap_ros.relational.state import Array
 from slap_ros.shortcuts.approaches import Approacher
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
-from slap_ros.shortcuts.observation_encoder import (
-    ObservationEncoder,
-    ObservationLayout,
-    observation_layout,
-)
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.observation_layout import ObservationLayout, observation_layout
 from slap_ros.shortcuts.signature import Signature, concerned
 from slap_ros.shortcuts.starts import Start, StartRecord, restore_starts, shortest_paths
 from slap_ros.shortcuts.straightening import (

@@ -12,7 +12,7 @@ from slap_ros.relational.state import Array
 
 @compiled
 def largest_shares(deficits: Array, shares: Array) -> Array:
-    """See :func:`slap_ros.shortcuts.observation_encoder.largest_shares`: the same bits."""
+    """See :func:`slap_ros.shortcuts.shaping_potential.largest_shares`: the same bits."""
     atoms, objects = shares.shape
     largest = np.empty((len(deficits), objects))
     for i in range(len(deficits)):

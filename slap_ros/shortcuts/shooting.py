@@ -14,9 +14,9 @@ import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.policies.mlp_policy import ActionSampler, Weights
-from slap_ros.shortcuts.observation_encoder import make_action_map
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_actions import make_action_map
 
 HOLD = 4  # steps that a random action is kept, as in exploration: noise of single steps cancels out
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from slap_ros.policies.action_map import ActionMap
-from slap_ros.shortcuts.observation_encoder import make_action_map
 from slap_ros.shortcuts.rewards import Rewards
+from slap_ros.shortcuts.shortcut_actions import make_action_map
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, restore_starts

@@ -45,8 +45,9 @@ from slap_ros.policies.library_files import (
 )
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.relational import State
-from slap_ros.shortcuts.observation_encoder import make_action_map, observation_layout
+from slap_ros.shortcuts.observation_layout import observation_layout
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_actions import make_action_map
 from slap_ros.shortcuts.signature import Signature
 
 FORMAT = 1

@@ -21,7 +21,7 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidStateError
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 from slap_ros.relational import State
-from slap_ros.shortcuts.observation_encoder import ObservationLayout, observation_layout
+from slap_ros.shortcuts.observation_layout import ObservationLayout, observation_layout
 from slap_ros.shortcuts.signature import Kind, Signature
 
 Bit = tuple[object, ...]  # a lifted atom with its sign, or a predicate about what is held

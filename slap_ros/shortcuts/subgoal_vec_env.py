@@ -14,7 +14,7 @@ from slap_ros.learning.subproc_vec_env import concatenated
 from slap_ros.learning.vec_env import VecEnvStep
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational.state import Array
-from slap_ros.shortcuts.observation_encoder import uses_gripper
+from slap_ros.shortcuts.shortcut_actions import uses_gripper
 from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Signature

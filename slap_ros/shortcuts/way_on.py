@@ -9,13 +9,13 @@ lie so that the next skill fails. So one way on is tried, the one that looks che
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from slap_ros.errors import InvalidStateError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.look_ahead import costs_to_go
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
 
@@ -106,20 +106,5 @@ def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
     Operators count with their mean, and those without one with the mean of the others.
     """
     cost = cost_of_edges(operator_steps)
-    incoming: list[list[Edge]] = [[] for _ in graph.nodes]
-    for edge in graph.edges:
-        incoming[edge.target].append(edge)
-    to_go = [float("inf")] * len(graph.nodes)
-    queue = [(0.0, goal) for goal in graph.goal_nodes]
-    for _, goal in queue:
-        to_go[goal] = 0.0
-    while queue:
-        rest, node = heapq.heappop(queue)
-        if rest > to_go[node]:
-            continue
-        for edge in incoming[node]:
-            longer = rest + cost(edge)
-            if longer < to_go[edge.source]:
-                to_go[edge.source] = longer
-                heapq.heappush(queue, (longer, edge.source))
-    return to_go
+    to_go = costs_to_go(graph.edges, len(graph.nodes), graph.goal_nodes, cost)
+    return [NO_WAY if steps is None else float(steps) for steps in to_go]

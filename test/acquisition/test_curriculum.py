@@ -14,7 +14,8 @@ from slap_ros.acquisition.curriculum import curriculum
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, SkillProgress
 from slap_ros.acquisition.curriculum.dead_ends import MOST_ATTEMPTS, DeadEnd, find_dead_ends
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, roll_out
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout, Stage
+from slap_ros.acquisition.curriculum.rollouts import roll_out
 from slap_ros.acquisition.curriculum.skill_selection import failing_often, select_skills
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.proposals.proposal_request import Demonstrations, ProposalRequest

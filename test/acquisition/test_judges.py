@@ -9,7 +9,7 @@ import pytest
 
 from slap_ros.acquisition.curriculum import jobs
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.task_source import VALIDATION, TaskSource
 from slap_ros.acquisition.training.judges import JudgeElsewhere
 from slap_ros.acquisition.training.sac import SkillLearner

@@ -8,7 +8,7 @@ import pytest
 
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, SkillProgress
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, StageEnd
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout, Stage, StageEnd
 from slap_ros.acquisition.curriculum.skill_selection import NO_PROGRESS, select_skills
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 

@@ -4,7 +4,7 @@
 
 import pytest
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, StageEnd
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout, Stage, StageEnd
 from slap_ros.acquisition.curriculum.solved_shares import Point, SolvedShares
 from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.api.acquisition import UnwatchedCurriculum

@@ -10,7 +10,7 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, PlanningLimitError, UnsolvableError
-from slap_ros.planning import anytime
+from slap_ros.planning import plan_improvement
 from slap_ros.planning.abstract_graph import Edge
 from slap_ros.planning.anytime import AnytimePlanner, PlanningInterrupted
 from slap_ros.planning.effort import Effort
@@ -141,9 +141,9 @@ def plan(planner, start, goal):
 
 
 @pytest.mark.parametrize("effort", [Effort(), Effort(rollouts=8), Effort(tests=20)], ids=str)
-@pytest.mark.parametrize("small", [0, anytime.SMALL])
+@pytest.mark.parametrize("small", [0, plan_improvement.SMALL])
 def test_lazy_search_finds_nothing_below_what_is_proven(effort, small, monkeypatch):
-    monkeypatch.setattr(anytime, "SMALL", small)
+    monkeypatch.setattr(plan_improvement, "SMALL", small)
     solved = 0
     for seed in range(120):
         problem, shortcuts, start, goal = made_up(seed)
@@ -175,7 +175,7 @@ def two_ways(model):
 
 
 def test_a_graph_without_a_plan_proves_nothing_of_a_deeper_one(monkeypatch):
-    monkeypatch.setattr(anytime, "SMALL", 0)
+    monkeypatch.setattr(plan_improvement, "SMALL", 0)
     problem, start, goal = two_ways(MadeUpModel())
     found = AnytimePlanner(problem).plan(start, goal)
     lazy = GraphPlanner(problem).plan(start, goal)

@@ -14,11 +14,11 @@ from slap_ros.domains.tabletop.observation import (
 )
 from slap_ros.domains.tabletop.state_access import JOINT_NAMES
 from slap_ros.relational import State
-from slap_ros.shortcuts.observation_encoder import (
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.shaping_potential import (
     JOINT_LIMIT_WEIGHT,
     LARGEST_SHARES,
     PROXIMITY_WEIGHT,
-    ObservationEncoder,
     largest_shares,
 )
 from slap_ros.shortcuts.signature import Change, Signature

@@ -19,7 +19,7 @@ from slap_ros.shortcuts.demonstrations import ShortcutDemonstration, demonstrate
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.named_settings import CHAINS, training_settings
-from slap_ros.shortcuts.observation_encoder import uses_gripper
+from slap_ros.shortcuts.shortcut_actions import uses_gripper
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 from slap_ros.shortcuts.starts import find_start

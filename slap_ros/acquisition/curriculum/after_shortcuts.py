@@ -14,7 +14,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, carry_out_stage
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
+from slap_ros.acquisition.curriculum.rollouts import carry_out_stage
 from slap_ros.core import Domain, Task
 from slap_ros.errors import NoSkillsError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.graph_planner import GraphPlanner

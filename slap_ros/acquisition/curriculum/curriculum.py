@@ -24,29 +24,28 @@ continues where it was interrupted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from slap_ros.acquisition.curriculum import jobs
 from slap_ros.acquisition.curriculum.after_shortcuts import ShortcutsChoice
-from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback, OngoingRound
+from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback
 from slap_ros.acquisition.curriculum.curriculum_folder import CurriculumFolder
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
+from slap_ros.acquisition.curriculum.curriculum_steps import CurriculumSteps
 from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
+from slap_ros.acquisition.curriculum.final_library import FinalLibrary
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
 from slap_ros.acquisition.curriculum.jobs import LearningJob, horizon_of
-from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned, compare
-from slap_ros.acquisition.curriculum.library_record import library_record, skill_record
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.skill_selection import (
     NO_PROGRESS,
     SkillSelection,
     select_skills,
 )
+from slap_ros.acquisition.curriculum.skills_at_hand import SkillsAtHand
 from slap_ros.acquisition.curriculum.task_source import ROLLOUTS, VALIDATION, TaskSource
 from slap_ros.acquisition.training.retrieval import METRICS, MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.training.settings import AcquisitionSettings
@@ -58,10 +57,9 @@ from slap_ros.acquisition.training.warm_start import (
     WarmStarts,
 )
 from slap_ros.errors import UnsolvableError
-from slap_ros.learning.finished_jobs import FinishedJobs
 from slap_ros.learning.stored_keys import stored
-from slap_ros.learning.workers import Workers, run_in_order
-from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, load_skill, save_skill
+from slap_ros.learning.workers import Workers
+from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary
 
 TWICE = 2  # iterations in a row with enough progress that end a curriculum
 
@@ -101,12 +99,16 @@ class Curriculum:
 
     def __post_init__(self) -> None:
         self._results = CurriculumFolder(self.folder)
-        self._domain = self.source.make_domain()
-        self.settings.require_room(horizon_of(self._domain))
-        self._segment_steps = self.settings.segment_steps(horizon_of(self._domain))
+        self._steps = CurriculumSteps(
+            self.source, self._results, self.workers, self.callback, self.shortcuts
+        )
+        horizon = horizon_of(self.source.make_domain())
+        self.settings.require_room(horizon)
+        self._segment_steps = self.settings.segment_steps(horizon)
         self._operators = {operator.name: operator for operator in self.source.operators()}
-        self._kept_folders = {skill.operator.name: path for path, skill in self.kept.items()}
-        self._kept = {name: self.kept[path] for name, path in self._kept_folders.items()}
+        kept_folders = {skill.operator.name: path for path, skill in self.kept.items()}
+        self._kept = {name: self.kept[path] for name, path in kept_folders.items()}
+        self._at_hand = SkillsAtHand(self._results, self._operators, kept_folders)
         self._begun: dict[str, WarmStart] = {}  # of each skill that began with a known one
         least = self.settings.least_similarity
         self._warm_starts = WarmStarts(self._kept, self.known, self.encoder, least)
@@ -126,7 +128,15 @@ class Curriculum:
         iteration = 0
         while not (ended := self._iterate(iteration, state)):
             iteration += 1
-        return self._library(ended, iteration, state)
+        final = FinalLibrary(
+            self._steps,
+            self.settings,
+            self._at_hand,
+            self._kept,
+            self._begun,
+            frozenset(self.continued.keys() & self._kept.keys()),
+        )
+        return final.make(ended, iteration, state, self._stored_settings)
 
     def _iterate(self, iteration: int, state: CurriculumState) -> str:
         """Carry out plans, and train what fails from where it fails.
@@ -139,8 +149,8 @@ class Curriculum:
             Why the curriculum is over; empty where it is not.
         """
         tasks = ROLLOUTS.batch(iteration, self.settings.rollouts)
-        at_hand = self._at_hand(state)
-        rollouts = self._roll_out(iteration, "rollouts", tasks, at_hand)
+        at_hand = self._at_hand.folders(state)
+        rollouts = self._steps.roll_out(iteration, "rollouts", tasks, at_hand)
         require_plans(rollouts, self.source)
         state.task_progress.append(fmean(rollout.progress for rollout in rollouts))
         state.progress_steps.append(state.steps)
@@ -151,7 +161,7 @@ class Curriculum:
         if state.solved.done(self.settings.solved, in_a_row=1):
             return ""  # judged again in other tasks: what may be enough is not trained further
         unseen = VALIDATION.batch(iteration, self.settings.validation)
-        fresh = self._roll_out(iteration, "fresh", unseen, at_hand)
+        fresh = self._steps.roll_out(iteration, "fresh", unseen, at_hand)
         selection = select_skills(rollouts, state, self.settings)
         state.not_trained = dict(selection.not_trained)
         if not selection.operators:
@@ -175,45 +185,6 @@ class Curriculum:
         if self._steps_left(state) < self._segment_steps:
             return "the budget is spent"
         return ""
-
-    # -- carrying out plans -----------------------------------------------------------------------
-
-    def _at_hand(self, state: CurriculumState) -> dict[str, str]:
-        """The folders of the skills that were learned, or else are kept, by operator name."""
-        learned = {name: str(self._skill(name, state)) for name in state.learned}
-        return self._kept_folders | learned
-
-    def _roll_out(
-        self, iteration: int, name: str, tasks: range, skills: dict[str, str]
-    ) -> list[PlanRollout]:
-        """Carry out plans with skills, by the folder of each."""
-        work = [(self.source, index, skills) for index in tasks]
-        return self._results.rollouts(iteration, name, partial(self._carry_out, work))
-
-    def _carry_out(
-        self, work: Sequence[tuple[TaskSource, int, dict[str, str]]], finished: FinishedJobs
-    ) -> list[Any]:
-        """Carry out plans, and what a search tries after shortcuts, if there are any.
-
-        Args:
-            work: Arguments of :func:`~slap_ros.acquisition.curriculum.jobs.carry_out`, one tuple
-                for each task.
-            finished: Tasks that are done already.
-        """
-        plans = self._run("carrying out plans", jobs.carry_out, work, finished)
-        if self.shortcuts is None:
-            return plans
-        after = [(*one, self.shortcuts) for one in work]
-        tried = self._run(
-            "trying skills after shortcuts", jobs.try_after_shortcuts, after, finished
-        )
-        return [*plans, *(rollout for task in tried for rollout in task)]
-
-    def _skill(self, name: str, state: CurriculumState) -> Path:
-        """The folder of a skill that was learned."""
-        return self._results.skill(self._operators[name], state.skills[name].attempt)
-
-    # -- training ---------------------------------------------------------------------------------
 
     def _start_over(
         self, iteration: int, dead_ends: Sequence[DeadEnd], state: CurriculumState
@@ -248,17 +219,15 @@ class Curriculum:
             for name in new
             if name not in chosen
         }
-        work = [
-            (self.source, name, starts, InitiationStates.of(name, rollouts).all[: settings.trials])
+        trials = [
+            (name, starts, InitiationStates.of(name, rollouts).all[: settings.trials])
             for name, starts in near.items()
             if starts
         ]
-        if not work:
+        if not trials:
             return chosen
-        found = self._results.known(
-            iteration, partial(self._run, "trying known skills", jobs.try_known, work)
-        )
-        for (_, name, starts, _), successes in zip(work, found, strict=True):
+        found = self._steps.try_known(iteration, trials)
+        for (name, starts, _), successes in zip(trials, found, strict=True):
             tried = tuple(map(TriedStart, starts, successes))
             chosen[name] = ChosenStart.among(tried, settings.least_success)
         return chosen
@@ -314,90 +283,11 @@ class Curriculum:
 
     def _train(self, iteration: int, rounds: Sequence[LearningJob], state: CurriculumState) -> None:
         """Train skills for a round each, and take note of how it went."""
-        left = self._steps_left(state)
-        outcomes = self._results.rounds(iteration, lambda: self._learn(iteration, rounds, left))
+        outcomes = self._steps.learn(iteration, rounds, self._steps_left(state))
         for job, outcome in zip(rounds, outcomes, strict=True):
             state.solved.learned(state.steps, self._segment_steps, job.operator, outcome)
             state.skills[job.operator] = state.skills[job.operator].after(job, outcome)
             self.callback.on_judged(iteration, job.operator, outcome)
-
-    def _learn(self, iteration: int, rounds: Sequence[LearningJob], left: int) -> list[Any]:
-        self.callback.on_learning(iteration, [OngoingRound.of(job) for job in rounds], left)
-        each = max(1, self.workers.processes // len(rounds))
-        return self._run("learning skills", jobs.learn, [(job, each) for job in rounds])
-
-    # -- the result -------------------------------------------------------------------------------
-
-    def _library(self, ended: str, iteration: int, state: CurriculumState) -> SkillLibrary:
-        """The library of the skills that were learned, and of those that were kept."""
-        unseen = VALIDATION.batch(iteration, self.settings.validation)
-        at_hand = self._at_hand(state)
-        fresh = self._roll_out(iteration, "final", unseen, at_hand)
-        compared = self._compare(fresh, state)
-        if known := [name for name, one in compared.items() if one.known_stays]:
-            at_hand |= {name: str(self._known_folder(name)) for name in known}
-            fresh = self._roll_out(iteration, "final_known", unseen, at_hand)
-        learned = [name for name in state.learned if name not in known or name not in self._kept]
-        vacuity = self._vacuity(learned, fresh)
-        skills = [skill for name, skill in self._kept.items() if name not in learned]
-        for name in learned:
-            skill = load_skill(Path(at_hand[name]), self._domain)
-            progress, both = state.skills[name], compared.get(name)
-            record = skill_record(progress, vacuity[name], self.source.seed, both)
-            skills.append(replace(skill, record=record))
-        ordered = sorted(skills, key=lambda skill: skill.folder_name)
-        record = library_record(self.source, self._stored_settings, state, ended, fresh)
-        return SkillLibrary(self.source.domain.name, tuple(ordered), record)
-
-    def _compare(
-        self, fresh: Sequence[PlanRollout], state: CurriculumState
-    ) -> dict[str, KnownOrLearned]:
-        """Try known skills and what was learned from them, by operator name.
-
-        Where a skill had to be learned from scratch after a dead end, what counts is not its own
-        success.
-
-        Args:
-            fresh: Plans on tasks that training never saw, with what was learned.
-            state: State of the curriculum in the end.
-        """
-        names = [n for n in state.learned if n in self._begun and not state.skills[n].attempt]
-        if not names:
-            return {}
-        starts = {name: InitiationStates.of(name, fresh).all for name in names}
-        work = [
-            (self.source, self._begun[name], self._skill(name, state), starts[name])
-            for name in names
-        ]
-        found = self._results.compared(lambda: self._run("trying known skills", compare, work))
-        return dict(zip(names, found, strict=True))
-
-    def _known_folder(self, name: str) -> Path:
-        """The folder of a known skill that stays; that of another library is written down."""
-        if name in self._kept_folders:
-            return Path(self._kept_folders[name])
-        operator, template = self._operators[name], self.source.rewards()[name]
-        policy, horizon = self._begun[name].policy, horizon_of(self._domain)
-        folder = self._results.known_skill(operator)
-        save_skill(folder, AcquiredSkill(operator, template, policy, horizon))
-        return folder
-
-    def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
-        """What policies that see nothing are worth in each skill's place; None where untried.
-
-        That is the operator's, and known already where a training goes on.
-        """
-        going_on = self.continued.keys() & self._kept.keys()
-        known = {name: self._kept[name].record.get("vacuity") for name in going_on}
-        starts = {name: InitiationStates.of(name, fresh).all for name in names}
-        begun = [name for name in names if starts[name] and name not in known]
-        work = [(self.source, name, starts[name], self.settings.judged) for name in begun]
-        found = self._results.vacuity(
-            partial(self._run, "trying constant actions", jobs.vacuity, work)
-        )
-        return dict.fromkeys(names) | known | dict(zip(begun, found, strict=True))
-
-    # -- plumbing ---------------------------------------------------------------------------------
 
     def _steps_left(self, state: CurriculumState) -> int:
         return self.settings.total_steps - state.steps
@@ -428,23 +318,6 @@ class Curriculum:
         if self.continued:
             data["continued"] = sorted(self.continued)
         return data
-
-    def _run(
-        self,
-        what: str,
-        function: Callable[..., Any],
-        work: Sequence[tuple[Any, ...]],
-        finished: FinishedJobs | None = None,
-    ) -> list[Any]:
-        """The results of a step's jobs, in their order.
-
-        Args:
-            what: Name of the step, in words.
-            function: Function of a job.
-            work: Arguments of the function, one tuple for each job.
-            finished: Jobs that have ended already; None where each keeps what it has done itself.
-        """
-        return run_in_order(self.workers, function, work, what, self.callback, finished)
 
 
 def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:

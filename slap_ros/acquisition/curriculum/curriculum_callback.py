@@ -11,7 +11,7 @@ from typing import Protocol
 
 from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
 from slap_ros.acquisition.curriculum.jobs import LearningJob
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.training.skill_training import Round, rounds_in
 from slap_ros.learning.progress_callback import ProgressCallback
 

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
 from slap_ros.learning.work_folder import WorkFolder

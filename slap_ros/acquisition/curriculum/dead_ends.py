@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 
 MOST_ATTEMPTS = 3  # attempts at learning a skill from scratch
 

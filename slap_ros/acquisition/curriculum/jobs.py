@@ -96,7 +96,7 @@ def carry_out(source: TaskSource, index: int, skills: Mapping[str, str]) -> dict
         skills: Folders of the skills at hand, by operator name.
 
     Returns:
-        A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON.
+        A :class:`~slap_ros.acquisition.curriculum.plan_rollout.PlanRollout` as JSON.
     """
     domain = source.make_domain()
     learned = {name: _skill(folder, domain) for name, folder in skills.items()}
@@ -159,7 +159,7 @@ def try_after_shortcuts(
         shortcuts: Shortcuts to plan with.
 
     Returns:
-        Each as a :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON.
+        Each as a :class:`~slap_ros.acquisition.curriculum.plan_rollout.PlanRollout` as JSON.
     """
     domain = source.make_domain()
     acquired = {name: load_skill(Path(folder), domain) for name, folder in skills.items()}

@@ -10,7 +10,7 @@ from typing import Any
 
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, SkillProgress
 from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.curriculum.skill_selection import NO_PROGRESS
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.versions import processor, versions

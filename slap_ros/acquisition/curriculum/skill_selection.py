@@ -18,7 +18,7 @@ from typing import Any
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
 from slap_ros.acquisition.curriculum.dead_ends import DeadEnd, find_dead_ends
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, StageEnd, failed_stages
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout, StageEnd, failed_stages
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 
 NO_PROGRESS = "no progress"  # reason why a skill is not trained, and why a curriculum then ends

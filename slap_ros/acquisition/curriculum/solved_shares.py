@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from statistics import fmean
 from typing import NamedTuple
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.acquisition.training.skill_training import ENOUGH_IN_A_ROW, Round
 
 

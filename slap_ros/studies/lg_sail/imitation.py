@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.jobs import require_torch
 from slap_ros.api.left_out import Tell

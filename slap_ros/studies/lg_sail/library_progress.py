@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from statistics import fmean
 from typing import Any, NamedTuple
 
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, roll_out
+from slap_ros.acquisition.curriculum.plan_rollout import PlanRollout, Stage
+from slap_ros.acquisition.curriculum.rollouts import roll_out
 from slap_ros.core import Domain, task_with_goal
 from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.evaluation.summary import Spread
@@ -158,7 +159,8 @@ def carry_out_task(choice: DomainChoice, goal: str, seed: int, index: int) -> di
         index: Index of the task.
 
     Returns:
-        A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON, without states.
+        A :class:`~slap_ros.acquisition.curriculum.plan_rollout.PlanRollout` as JSON, without
+        states.
     """
     domain = open_domain(choice)
     return carry_out(domain, goal, seed, index, learned_skills(domain))
@@ -182,7 +184,8 @@ def carry_out(
         skills: Skills by operator name.
 
     Returns:
-        A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON, without states.
+        A :class:`~slap_ros.acquisition.curriculum.plan_rollout.PlanRollout` as JSON, without
+        states.
     """
     task = task_with_goal(domain, seed, index, goal)
     return without_states(roll_out(domain, task, index, domain.operators, skills))
