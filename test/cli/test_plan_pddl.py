@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import Result
+from typer.testing import Result
 
 from slap_ros.cli.plan_pddl import plan_symbolically
 from slap_ros.errors import ErrorCode

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command ``slap`` in the process of the test, which has everything imported."""
 
-from click.testing import Result
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from ensemble.cli.application import app
 
