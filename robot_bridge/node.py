@@ -68,22 +68,16 @@ Action clients:
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection
 from enum import Enum
 from typing import Any
 
-from builtin_interfaces.msg import Time
 from rclpy.task import Future
 from slap_msgs.srv import ResetTask
 
-from ensemble import encode
-from ensemble.endpoints import advertise
 from ensemble.entry_point import run_node
-from ensemble.interfaces import MARKERS
-from ensemble.lockstep_world import QUIET, LockstepWorld
 from ensemble.robot_parameters import RobotBridgeParameters
 from ensemble.steady_time import create_timer
+from robot_bridge.bridge import Bridge
 from robot_bridge.robot import Robot
 from robot_bridge.sole_bridge import require_alone
 from robot_bridge.step_measurement import StepMeasurement
@@ -98,7 +92,7 @@ from slap_ros.errors import (
     SlapError,
 )
 from slap_ros.messages.decode import decode_goal
-from slap_ros.relational import GroundAtom, State
+from slap_ros.relational import State
 from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.horizon import Horizon
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
@@ -107,7 +101,6 @@ POLL_PERIOD = 0.02  # s, between two looks at what is measured
 # What keeps a task from being begun, as long as it lasts.
 UNSTARTED = (AlreadyRunningError, InvalidStateError, NoDetectionError, NoJointStateError)
 MOTIONLESS = 3  # motions in a row in which the arm stood, after which it is held to be stuck
-REPORT_PERIOD_S = 1.0  # between two reports of why there is no task yet
 
 
 class Phase(Enum):
@@ -120,27 +113,23 @@ class Phase(Enum):
     FAULT = "holding after a failure"
 
 
-class RobotBridge(LockstepWorld[RobotBridgeParameters]):
+class RobotBridge(Bridge[RobotBridgeParameters]):
     """The robot bridge."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("robot_bridge", RobotBridgeParameters, ("unsafe_commands",), **kwargs)
+        super().__init__("robot_bridge", RobotBridgeParameters, **kwargs)
         self._robot = Robot(self, self._domain, self._sampled_state, self._settings)
         self._phase = Phase.STARTING
         self._since_s = (
             self._robot.clock.now_s()
         )  # when the phase, or the measurement of a state, began
-        told = self._settings.first_task(self._domain) if self._settings.goal else None
-        self._goal: Collection[GroundAtom] = told.goal if told is not None else ()
         self._motion: Future | None = None  # the newest: done when its controllers have answered
         self._measurement: StepMeasurement  # of the step under way
         self._stood = 0  # motions in a row in which the arm stood
-        self._reported_s = -math.inf  # when it was last said why there is no task yet
         period_s = self._domain.execution.control_period_s
         self._horizon = Horizon(self._settings.horizon, self._settings.motion_limits, period_s)
         self._expected = False  # whether the state in which the motion ends is published already
         self._next: Action | None = None  # which answers that state, and waits for its measurement
-        self._markers = advertise(self, MARKERS)
         create_timer(self, POLL_PERIOD, self._poll)
         self._publish_domain()
 
@@ -235,10 +224,10 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
     def _poll(self) -> None:
         """Whatever time brings: a state, or a sensor that has become silent."""
         if self._phase is Phase.STARTING:
-            if missing := self._robot.controllers.missing:
-                self._report_missing(missing)
-            else:
+            if not (missing := self._robot.controllers.missing):
                 self._start()
+            elif self._has_waited:
+                self._say_missing(missing, "arm, trajectory_action and gripper_action")
         elif self._phase is Phase.READY and self._horizon.commands and self._is_idle:
             self._move(expected=True)
         elif self._phase in (Phase.MOVING, Phase.LOOKING):
@@ -284,14 +273,10 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     # -- episodes -------------------------------------------------------------------------------
 
-    def _report_missing(self, controllers: list[str]) -> None:
-        """Say what is waited for. It is no fault: a robot may be started after the bridge."""
-        if self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout:
-            self.get_logger().warning(
-                f"not yet: no controller offers {', '.join(controllers)}: is it running, and are "
-                "arm, trajectory_action and gripper_action right?",
-                throttle_duration_sec=QUIET,
-            )
+    @property
+    def _has_waited(self) -> bool:
+        """Whether everything should have been there by now."""
+        return self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout
 
     def _start(self) -> None:
         try:
@@ -299,20 +284,13 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             if state is not None:
                 require_alone(self)
                 self._begin(state)
-            elif self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout:
+            elif self._has_waited:
                 raise self._unmeasured
         except UNSTARTED as error:
-            now_s = self._robot.clock.now_s()
-            if now_s - self._reported_s >= REPORT_PERIOD_S:
-                self._reported_s = now_s
-                self.get_logger().warning(f"not yet: {error}")
-                self._publish_fault(error)
+            self._say_not_yet(error, self._robot.clock.now_s())
 
     def _reset(self, request: ResetTask.Request) -> None:
-        if request.initial_state.objects:
-            raise InvalidStateError(
-                "a robot cannot be put into a state: arrange the objects, then reset without one"
-            )
+        self._require_arranged(request)
         if self._motion is not None and not self._motion.done():
             # Also after a failure: what is left of the motion would go on in the new episode.
             raise BusyError(
@@ -351,10 +329,6 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         self._stood = 0
         self._enter(Phase.READY)
         self._open_episode(Task(state, goal, self._domain.step_limit))
-
-    def _show(self, state: State, stamp: Time) -> None:
-        # Not as frames or joint states: those are the robot's own to publish.
-        self._markers.publish(encode.SCENE.markers(self._domain.display.bodies(state), stamp))
 
 
 def main() -> int:

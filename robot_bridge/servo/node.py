@@ -53,20 +53,15 @@ Action clients:
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from enum import Enum
 from typing import Any
 
-from builtin_interfaces.msg import Time
 from slap_msgs.srv import ResetTask
 
-from ensemble import encode
-from ensemble.endpoints import advertise
 from ensemble.entry_point import run_node
-from ensemble.interfaces import MARKERS
-from ensemble.lockstep_world import QUIET, LockstepWorld
 from ensemble.robot_parameters import ServoBridgeParameters, action_name, arm_joints
 from ensemble.steady_time import JumpFreeClock, create_timer
+from robot_bridge.bridge import Bridge
 from robot_bridge.sensors import Sensors
 from robot_bridge.servo.controllers import ServoControllers
 from robot_bridge.sole_bridge import require_alone
@@ -80,7 +75,7 @@ from slap_ros.errors import (
     SlapError,
 )
 from slap_ros.messages.decode import decode_goal
-from slap_ros.relational import GroundAtom, State
+from slap_ros.relational import State
 from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.robot.servoed_robot import ServoedRobot
@@ -94,7 +89,6 @@ UNSTARTED = (
     NoDetectionError,
     NoJointStateError,
 )
-REPORT_PERIOD_S = 1.0  # between two reports of why there is no task yet
 
 
 class ServoPhase(Enum):
@@ -106,11 +100,11 @@ class ServoPhase(Enum):
     FAULT = "holding after a failure"
 
 
-class ServoBridge(LockstepWorld[ServoBridgeParameters]):
+class ServoBridge(Bridge[ServoBridgeParameters]):
     """The bridge to a robot at a bench."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("servo_bridge", ServoBridgeParameters, ("unsafe_commands",), **kwargs)
+        super().__init__("servo_bridge", ServoBridgeParameters, **kwargs)
         settings = self._settings
         task = settings.first_task(self._domain)
         self._robot = ServoedRobot(
@@ -130,10 +124,7 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
             self._fail,
         )
         self._period_s = self._domain.execution.control_period_s / settings.pace
-        self._goal: Collection[GroundAtom] = task.goal if settings.goal else ()
         self._phase, self._since_s = ServoPhase.STARTING, self._robot_clock.now_s()
-        self._reported_s = -math.inf
-        self._markers = advertise(self, MARKERS)
         create_timer(self, POLL_PERIOD, self._poll)
         self._publish_domain()
 
@@ -179,10 +170,10 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
     def _poll(self) -> None:
         """Whatever time brings: a state, or a sensor that has become silent."""
         if self._phase is ServoPhase.STARTING:
-            if missing := self._controllers.missing:
-                self._report_missing(missing)
-            else:
+            if not (missing := self._controllers.missing):
                 self._start()
+            elif self._has_waited:
+                self._say_missing(missing, "arm, trajectory_topic and gripper_action")
         elif self._phase is ServoPhase.MOVING:
             over_s = self._since_s + self._period_s
             if self._robot_clock.now_s() >= over_s:
@@ -238,14 +229,10 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
 
     # -- episodes -------------------------------------------------------------------------------
 
-    def _report_missing(self, controllers: list[str]) -> None:
-        """Say what is waited for. It is no fault: a robot may be started after the bridge."""
-        if self._robot_clock.now_s() - self._since_s > self._settings.detection_timeout:
-            self.get_logger().warning(
-                f"not yet: no controller has {', '.join(controllers)}: is it running, and are "
-                "arm, trajectory_topic and gripper_action right?",
-                throttle_duration_sec=QUIET,
-            )
+    @property
+    def _has_waited(self) -> bool:
+        """Whether everything should have been there by now."""
+        return self._robot_clock.now_s() - self._since_s > self._settings.detection_timeout
 
     def _start(self) -> None:
         try:
@@ -253,12 +240,8 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
             require_alone(self)
             self._begin(state)
         except UNSTARTED as error:
-            now_s = self._robot_clock.now_s()
-            waited = now_s - self._since_s > self._settings.detection_timeout
-            if waited and now_s - self._reported_s >= REPORT_PERIOD_S:
-                self._reported_s = now_s
-                self.get_logger().warning(f"not yet: {error}")
-                self._publish_fault(error)
+            if self._has_waited:
+                self._say_not_yet(error, self._robot_clock.now_s())
 
     def _measured_first(self) -> State:
         """The state in which an episode begins.
@@ -275,10 +258,7 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
         return state
 
     def _reset(self, request: ResetTask.Request) -> None:
-        if request.initial_state.objects:
-            raise InvalidStateError(
-                "a robot cannot be put into a state: arrange the objects, then reset without one"
-            )
+        self._require_arranged(request)
         state = self._measured_first()
         self._goal = decode_goal(request.goal, self._domain.atom_space(state))
         self._begin(state)
@@ -287,10 +267,6 @@ class ServoBridge(LockstepWorld[ServoBridgeParameters]):
         goal = frozenset(self._goal) or self._domain.default_goal(state)
         self._enter(ServoPhase.READY)
         self._open_episode(Task(state, goal, self._domain.step_limit))
-
-    def _show(self, state: State, stamp: Time) -> None:
-        # Not as frames or joint states: those are the robot's own to publish.
-        self._markers.publish(encode.SCENE.markers(self._domain.display.bodies(state), stamp))
 
 
 def main() -> int:
