@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.printing import show
 from slap_ros.core import Domain
 from slap_ros.errors import UnsolvableError
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.scripted_skill import ScriptedSkill

@@ -24,7 +24,7 @@ from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.demonstrations import demonstrate
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts
 from slap_ros.shortcuts.sampling import Sampling

@@ -18,7 +18,7 @@ from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import Feature
 from slap_ros.shortcuts.exploration_policies import RandomExploration
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.skills.domain_choice import DomainChoice
 from support import gripper_first, sweeping
 

@@ -15,7 +15,7 @@ from slap_ros.shortcuts.approaches import APPROACHED, MOST_STEPS, Approacher, si
 from slap_ros.shortcuts.demonstrations import demonstrate
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.exploration_steps import usual_steps
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.named_settings import APPROACHES, training_settings
 from slap_ros.shortcuts.shortcut_candidate import ShortcutCandidate
 from slap_ros.shortcuts.starts import find_start, restore_starts

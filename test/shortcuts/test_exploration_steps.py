@@ -12,7 +12,7 @@ import pytest
 from slap_ros.api.growth import GrowthRequest
 from slap_ros.domains import get_domain
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 
 MODELS = Path(__file__).parents[2] / "models/grown"
 NEAR = ExplorationSettings(

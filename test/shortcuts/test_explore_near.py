@@ -20,7 +20,7 @@ from slap_ros.relational import Column, State
 from slap_ros.shortcuts import way_on
 from slap_ros.shortcuts.exploration_policies import PUSH, PushAim
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.rollout_origins import OptionRetracer

@@ -14,7 +14,7 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.shortcuts.demonstrations import NoisyRepetitions, demonstrate, demonstrated
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
 from slap_ros.shortcuts.named_settings import CHAINS, training_settings
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder

@@ -17,7 +17,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.shortcuts.demonstrations import ShortcutDemonstration, demonstrate, demonstrated
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.named_settings import CHAINS, training_settings
 from slap_ros.shortcuts.shortcut_actions import uses_gripper
 from slap_ros.shortcuts.signature import Change, Signature

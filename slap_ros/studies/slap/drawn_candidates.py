@@ -17,7 +17,7 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.candidate_groups import ProblemKey, problem_key
 from slap_ros.shortcuts.exploration_result import ExplorationResult
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.learning_attempt import LearningAttempt, learn
 from slap_ros.shortcuts.progress import latest
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings

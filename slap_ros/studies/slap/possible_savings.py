@@ -22,7 +22,7 @@ from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.candidate_groups import ProblemKey, problem_key
 from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 from slap_ros.shortcuts.named_settings import NEAR, training_settings
 from slap_ros.shortcuts.saving_bounds import Operators, SavingBound, saving_bounds
 from slap_ros.shortcuts.way_on import steps_to_goal

@@ -8,7 +8,7 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidStateError
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
-from slap_ros.shortcuts.explore import Explorer
+from slap_ros.shortcuts.explorer import Explorer
 
 
 def explore(nodes):
