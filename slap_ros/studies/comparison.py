@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
+from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.experiment import Experiment, Trial, solve
 from slap_ros.evaluation.summary import Spread, Summary
@@ -160,6 +162,17 @@ class Comparison:
 def named_tasks(tasks: Iterable[tuple[int, int]]) -> dict[str, tuple[int, int]]:
     """Seed and index of tasks, by what they are called on the terminal and in logs."""
     return {f"seed {seed}, task {index}": (seed, index) for seed, index in tasks}
+
+
+def failures(trials: Iterable[Trial]) -> Counter[str]:
+    """Numbers of tasks that were not solved, by the name of their error code."""
+    return Counter(ErrorCode(one.error_code).name for one in trials if not one.success)
+
+
+def failures_in_words(trials: Iterable[Trial]) -> str:
+    """The same for a cell of a table, the most frequent first."""
+    counts = failures(trials).most_common()
+    return ", ".join(f"`{name}` {count}" for name, count in counts) or "none"
 
 
 def not_solved(attempted: TaskOutcome) -> str | None:

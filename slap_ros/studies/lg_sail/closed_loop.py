@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,14 +15,14 @@ from slap_ros.api.opening import open_chosen
 from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.core import task_with_goal
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode, InvalidParameterError
+from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.evaluation.experiment import Trial, solve
 from slap_ros.evaluation.summary import format_spread
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
-from slap_ros.studies.comparison import not_solved
+from slap_ros.studies.comparison import failures, failures_in_words, not_solved
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,
@@ -143,12 +142,6 @@ class LoopRow:
         """Success, length and replans."""
         return ReplannedTrials(self.trials)
 
-    @property
-    def failures(self) -> Counter[str]:
-        """Tasks that were not solved, by the name of their error code."""
-        failed = [trial for trial in self.trials if not trial.success]
-        return Counter(ErrorCode(trial.error_code).name for trial in failed)
-
     def as_json(self) -> dict[str, Any]:
         """The summary, and every trial."""
         return {
@@ -157,14 +150,13 @@ class LoopRow:
             "library": self.loop.choice.digest,
             "stiffness": self.loop.stiffness,
             **self.figures.as_json(),
-            "failures": dict(self.failures),
+            "failures": dict(failures(self.trials)),
             "trials": [trial.as_json() for trial in self.trials],
         }
 
     def as_row(self) -> list[str]:
         """Row of a table."""
         figures = self.figures
-        failures = [f"`{name}` {count}" for name, count in self.failures.most_common()]
         return [
             self.loop.goal or "(the task's own)",
             self.skills,
@@ -172,7 +164,7 @@ class LoopRow:
             f"{figures.solved.successes} of {figures.solved.trials} ({figures.solved})",
             format_spread(figures.length, 0),
             format_spread(figures.replans, 1),
-            ", ".join(failures) or "none",
+            failures_in_words(self.trials),
         ]
 
 

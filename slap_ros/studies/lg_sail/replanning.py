@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +18,7 @@ from slap_ros.evaluation.experiment import Experiment, Trial, task_job, try_task
 from slap_ros.evaluation.summary import format_spread
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.skills.domain_choice import DomainChoice, chosen_skills
-from slap_ros.studies.comparison import named_tasks, not_solved
+from slap_ros.studies.comparison import failures, failures_in_words, named_tasks, not_solved
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,
@@ -120,12 +119,6 @@ class ReplanningRow:
         """Success, length and replans of the trials of all libraries."""
         return ReplannedTrials(self.trials)
 
-    @property
-    def failures(self) -> Counter[str]:
-        """Tasks that were not solved, by the name of their error code."""
-        failed = [trial for trial in self.trials if not trial.success]
-        return Counter(ErrorCode(trial.error_code).name for trial in failed)
-
     def as_json(self) -> dict[str, Any]:
         """The summary, and that of each library."""
         figures = self.figures
@@ -137,14 +130,13 @@ class ReplanningRow:
             "replans": asdict(figures.replans),
             "replanned": sum(trial.replans > 0 for trial in self.trials),
             "steps": asdict(figures.length) if figures.length else None,
-            "failures": dict(self.failures),
+            "failures": dict(failures(self.trials)),
             "libraries": [library.as_json() for library in self.libraries],
         }
 
     def as_row(self) -> list[str]:
         """Row of a table."""
         tasks, figures = len(self.libraries[0].trials), self.figures
-        failures = [f"`{name}` {count}" for name, count in self.failures.most_common()]
         return [
             self.goal or "(the task's own)",
             self.seeds,
@@ -152,7 +144,7 @@ class ReplanningRow:
             str(figures.solved),
             format_spread(figures.replans, 2),
             format_spread(figures.length, 0),
-            ", ".join(failures) or "none",
+            failures_in_words(self.trials),
         ]
 
 
