@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from slap_ros.core import Action
 from slap_ros.relational import State
@@ -26,7 +26,8 @@ from slap_ros.worlds.contact.world import ACTION_SPACE
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, GraspKinematics
 
 
-class ServoCommand(NamedTuple):
+@dataclass(frozen=True)
+class ServoCommand:
     """What a robot is told for a control period.
 
     Args:

@@ -9,7 +9,7 @@ The contact world pulls the hand there by a force. A robot pulls the arm's joint
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from slap_ros.core import Action
 from slap_ros.geometry.pose import Pose, Vector, from_rotation_vector, multiply
@@ -19,7 +19,8 @@ from slap_ros.worlds.contact.hand import LEASH, YAW_LEASH, HandState, rotation_b
 ACTING = 0.5  # 1, beyond which the gripper is told something new
 
 
-class HandCommand(NamedTuple):
+@dataclass(frozen=True)
+class HandCommand:
     """What the hand was told last, which is a part of its state that nothing measures.
 
     Args:
@@ -44,7 +45,8 @@ class HandCommand(NamedTuple):
         return cls(pose.position, 2.0 * math.atan2(y, x), closing)
 
 
-class CommandedHand(NamedTuple):
+@dataclass(frozen=True)
+class CommandedHand:
     """The hand with its target moved and its gripper told, before anything has moved.
 
     Args:
