@@ -11,11 +11,13 @@ import argparse
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from time import process_time
 from typing import Any
 
 import numpy as np
 
+from benchmarks import contact_skills
 from benchmarks.contact_skills import grasped_world, grasps, in_hand
 from benchmarks.printing import show
 from benchmarks.workbench import (
@@ -32,6 +34,7 @@ from slap_ros.geometry.pose import rotate
 from slap_ros.worlds.contact import dynamics, simulation
 from slap_ros.worlds.contact.contacts import Side
 from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.hand_model import QUICK
 from slap_ros.worlds.contact.simulation_pool import close_idle
 from slap_ros.worlds.contact.world import ContactWorld
 
@@ -147,7 +150,7 @@ def pieces() -> dict[str, tuple[Callable[[], Figures], tuple[Any, str, Any]]]:
         "prime": (impure, (contact, "_prime", lambda *_: None)),
         "rest mark": (drift, (dynamics, "REST_SPEED", 0.0)),
         "forces per substep": (pressing, (simulation, "MOTOR_SUBSTEPS", 1)),
-        "slow fingers": (pressing, (simulation, "FINGER_SPEED", 2.0)),
+        "slow fingers": (pressing, (contact_skills, "HAND", replace(QUICK, finger_speed=2.0))),
         "coupled fingers": (pressing, (simulation, "COUPLING_N", 0.0)),
         "spinning friction": (droop, (simulation, "FINGER_SPINNING", 0.0)),
         "rolling friction": (rolling, (simulation, "ROLLING", 0.0)),

@@ -54,10 +54,12 @@ from slap_ros.relational import State
 from slap_ros.worlds.bodies import GREY
 from slap_ros.worlds.contact.features import ROBOT, robot_features
 from slap_ros.worlds.contact.hand import hand_at, wrapped
+from slap_ros.worlds.contact.hand_model import QUICK
 from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
 from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.worlds.features import body_features
 
+HAND = QUICK  # what grasps; a benchmark without a piece has another one
 SHAKEN = 100  # steps
 SHAKE = (0.006, 0.006, 0.006, 0.05)  # m and rad a step, standard deviations
 OFF = 0.005  # m, how far off the middle a thing is grasped at most, along each axis
@@ -123,7 +125,7 @@ def grasped_world(name: str, seed: int) -> ContactWorld:
     off = rng.uniform(-OFF, OFF, 2)
     gx, gy = x + ahead[0] + float(off[0]), y + ahead[1] + float(off[1])
     turn = yaw + float(rng.uniform(-OFF_TURN, OFF_TURN))
-    scene = ContactScene((TABLE, thing.body))
+    scene = ContactScene((TABLE, thing.body), HAND)
     low = (gx, gy, thing.height + ahead[2])
     features = {
         ROBOT("robot"): robot_features(hand_at((gx, gy, max(0.12, low[2] + 0.07)), turn)),

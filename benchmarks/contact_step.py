@@ -41,9 +41,10 @@ from slap_ros.worlds.bullet import PANDA, pybullet
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S, arm_joints
 from slap_ros.worlds.contact.contacts import Side, Surface
 from slap_ros.worlds.contact.hand import SUBSTEPS, HandState, hand_at
+from slap_ros.worlds.contact.hand_model import QUICK
 from slap_ros.worlds.contact.involved import Involved
 from slap_ros.worlds.contact.scene import ContactScene
-from slap_ros.worlds.contact.simulation import FINGER_FRICTION, ContactSimulation
+from slap_ros.worlds.contact.simulation import ContactSimulation
 from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot
 from slap_ros.worlds.contact.world import ContactWorld
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, HOME, JOINTS
@@ -72,7 +73,7 @@ class ArticulatedArm(ContactSimulation):
         self._places[arm] = self._next_parking()
         self._home = pybullet.getBasePositionAndOrientation(arm, self.client)
         for link in range(-1, pybullet.getNumJoints(arm, self.client)):
-            friction = FINGER_FRICTION if link in FINGER_LINKS else 0.9
+            friction = QUICK.friction if link in FINGER_LINKS else 0.9
             self._touchable(arm, link, Surface(Side.PALM), friction)
             pybullet.changeDynamics(arm, link, jointDamping=0.0, physicsClientId=self.client)
         left, right = FINGER_LINKS
@@ -135,7 +136,7 @@ class ArticulatedArm(ContactSimulation):
             FINGER_LINKS,
             pybullet.POSITION_CONTROL,
             targetPositions=(wanted, wanted),
-            forces=[self.scene.forces.grip_n / SUBSTEPS] * 2,
+            forces=[self.scene.hand.grip_n / SUBSTEPS] * 2,
             positionGains=[0.2] * 2,
             velocityGains=[1.0] * 2,
             physicsClientId=client,

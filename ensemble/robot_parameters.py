@@ -29,7 +29,7 @@ GRIPPER_ACTION = "franka_gripper/gripper_action"
 BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
     {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 70.0}
 )
-# At a bench fingers press as hard as those of the contact world (``HandForces``).
+# At a bench fingers press as hard as those of the contact world (``HandModel``).
 BEFORE_MUJOCO_AT_A_BENCH = MappingProxyType({**BEFORE_MUJOCO, "gripper_effort": 40.0})
 Parameters = Mapping[str, str | int | float | tuple[float, ...]]
 WORKSPACE = (*Workspace().low, *Workspace().high)

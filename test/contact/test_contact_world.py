@@ -33,7 +33,8 @@ from slap_ros.worlds.contact.arm import MAX_JOINT_STEP
 from slap_ros.worlds.contact.contacts import Side
 from slap_ros.worlds.contact.features import robot_features
 from slap_ros.worlds.contact.hand import LEASH, hand_at
-from slap_ros.worlds.contact.scene import TABLE, ContactScene, HandForces, box, cylinder
+from slap_ros.worlds.contact.hand_model import HandModel
+from slap_ros.worlds.contact.scene import TABLE, ContactScene, box, cylinder
 from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, grasp_pose
 from support.states import changed
@@ -87,7 +88,7 @@ def test_the_target_stays_on_its_leash(world):
 
 
 def test_the_hand_presses_with_its_force():
-    scene = ContactScene(LOOSE.bodies, HandForces(pull_n=25.0))
+    scene = ContactScene(LOOSE.bodies, HandModel(pull_n=25.0))
     with ContactWorld(scene, start(Setting(hand=hand_at((0.45, -0.02, 0.02))), LOOSE)) as world:
         for _ in range(20):
             world.step(np.array([0.0, 0.0, -MAX_SHIFT, 0.0, 0.0]))
@@ -189,7 +190,7 @@ def test_the_hands_own_way_is_what_the_simulation_makes_of_it():
             target_yaw=hand.yaw + float(rng.uniform(-0.3, 0.3)),
             closing=step % 20 < 10,
         )
-        alone = own_way(hand, hand.target_pose, scene.forces)
+        alone = own_way(hand, hand.target_pose, scene.hand)
         now = ContactSnapshot((0.0,) * 7, hand, (), ())
         full = simulation.run(now, hand.target_pose, Involved()).hand
         assert math.dist(alone.pose.position, full.pose.position) < 3e-5
@@ -312,8 +313,8 @@ def _lid(**changes):
 
 
 def test_forces_that_cannot_be():
-    with pytest.raises(InvalidDomainError, match="pull must be above 0 N, not -1"):
-        ContactScene((CUBE,), HandForces(pull_n=-1.0))
+    with pytest.raises(InvalidDomainError, match="pull_n must be above 0, not -1"):
+        ContactScene((CUBE,), HandModel(pull_n=-1.0))
 
 
 def test_random_garbage(world):

@@ -46,7 +46,7 @@ def test_both_fingers_press_with_the_force_that_they_have():
             for surface in (point.first, point.second):
                 if surface.side in forces:
                     forces[surface.side] += point.force_n
-    grip = world.scene.forces.grip_n
+    grip = world.scene.hand.grip_n
     assert forces == {side: pytest.approx(grip, rel=0.1) for side in forces}
 
 

@@ -26,7 +26,7 @@ from recorder_node.node import RecorderParameters
 from sim_node.node import SimParameters
 from skill_server.node import SkillServerParameters
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.worlds.contact.scene import HandForces
+from slap_ros.worlds.contact.hand_model import HandModel
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = sorted(path.name for path in CONFIG.glob("*.yaml"))
@@ -105,4 +105,4 @@ def test_a_launched_robot_at_a_bench_has_the_parameters_of_a_started_one():
     launched = blocks("mujoco.yaml")["servo_bridge"]
     started = node_parameters(settings)["robot_bridge.servo"]
     assert {key: as_default(value) for key, value in launched.items()}.items() <= started.items()
-    assert launched["gripper_effort"] == HandForces().grip_n
+    assert launched["gripper_effort"] == HandModel().grip_n

@@ -55,9 +55,7 @@ class MeasuredPlant:
         self.plant, self.pace = MujocoPlant.of(domain, initial), pace
         scene = scene_around(domain, initial)
         self.robot = ServoedRobot(domain, sampled_scene_config(initial), workspace, EXACT, pace)
-        self._controllers = PlantControllers(
-            self.plant, UNCHECKED, scene.forces.grip_n, self._watch
-        )
+        self._controllers = PlantControllers(self.plant, UNCHECKED, scene.hand.grip_n, self._watch)
         self._joints_s = self._seen_s = -1.0
         self._pending = []
         began_s = self.now_s

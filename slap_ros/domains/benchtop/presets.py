@@ -28,6 +28,7 @@ from slap_ros.domains.benchtop.visualization import VIEW, display
 from slap_ros.relational import Layout, Metric, Predicate, State, Type
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
 from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.hand_model import HANDS, HandModel
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.settling import settled
 from slap_ros.worlds.contact.world import ACTION_SPACE, ContactWorld
@@ -50,6 +51,11 @@ NEAR_SETTINGS = {
 
 class BenchtopTasks(Protocol):
     """What tasks are sampled from: a dataclass of settings, one for each preset."""
+
+    @property
+    def hand(self) -> str:
+        """The name of the hand."""
+        ...
 
     def sample(self, rng: np.random.Generator) -> Task:
         """A task; no two are alike."""
@@ -108,9 +114,10 @@ def benchtop_domain(
     Raises:
         InvalidDomainError: Its parts do not fit.
     """
+    hand = HANDS[settings.hand]
 
     def scene_of(state: State) -> ContactScene:
-        return without_missing(model.scene_of(state), state.layout)
+        return acted_on(model.scene_of(state), state.layout, hand)
 
     return Domain(
         name=name,
@@ -141,10 +148,17 @@ def benchtop_domain(
 
 
 @lru_cache(maxsize=256)
-def without_missing(scene: ContactScene, layout: Layout) -> ContactScene:
-    """The scene without the bodies that move and are no objects of a state."""
+def acted_on(scene: ContactScene, layout: Layout, hand: HandModel) -> ContactScene:
+    """The scene as a state's world has it.
+
+    Args:
+        scene: Scene of the domain.
+        layout: Layout of the state: bodies that move and are none of its objects are left out.
+        hand: Hand that acts there.
+    """
     moving = {body.name for body in scene.free} | {body.name for body in scene.jointed}
     missing = moving - layout.by_name.keys()
-    if not missing:
+    if not missing and hand == scene.hand:
         return scene
-    return replace(scene, bodies=tuple(b for b in scene.bodies if b.name not in missing))
+    bodies = tuple(body for body in scene.bodies if body.name not in missing)
+    return replace(scene, bodies=bodies, hand=hand)

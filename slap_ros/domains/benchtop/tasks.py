@@ -5,10 +5,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
+from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError
+from slap_ros.worlds.contact.hand_model import HANDS
 
 Range = tuple[float, float]
 Spot = tuple[float, float]  # x, y
@@ -21,6 +25,19 @@ BENCH_LIMITS = {
     "y": (-0.5, 0.5),
     "yaw": (-math.pi, math.pi),
 }
+
+
+@dataclass(frozen=True)
+class BenchSettings(TaskSettings):
+    """What tasks at any bench are made from.
+
+    Args:
+        hand: Name of the hand that acts there.
+    """
+
+    choices: ClassVar = {"hand": tuple(HANDS)}
+
+    hand: str = field(default="quick", kw_only=True)
 
 
 def spread_out(

@@ -21,7 +21,7 @@ from slap_ros.domains.benchtop.room import (
     upright,
     within_reach,
 )
-from slap_ros.domains.benchtop.tasks import ANY, BENCH_LIMITS, Range, some_of
+from slap_ros.domains.benchtop.tasks import ANY, BENCH_LIMITS, BenchSettings, Range, some_of
 from slap_ros.domains.bowls.demonstrator import rim_at
 from slap_ros.domains.bowls.model import BOWL, ON, PLATE, SPOTS, SURFACE
 from slap_ros.domains.bowls.scenery import (
@@ -34,7 +34,6 @@ from slap_ros.domains.bowls.scenery import (
     bowl,
     bowl_features,
 )
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
@@ -70,7 +69,7 @@ Poses = dict[str, Pose]  # of the plate and of furniture, by name
 
 
 @dataclass(frozen=True)
-class RandomBowlTasks(TaskSettings):
+class RandomBowlTasks(BenchSettings):
     """Furniture is put anywhere, and bowls at some of ten spots that are told by it.
 
     ``task`` is the number of the spot at which there surely is a bowl, and that of the goal that
@@ -134,7 +133,7 @@ class RandomBowlTasks(TaskSettings):
 
 
 @dataclass(frozen=True)
-class PaperBowlTasks(TaskSettings):
+class PaperBowlTasks(BenchSettings):
     """In the manner of LIBERO: plate and furniture in their places, bowls at some of ten spots.
 
     ``task`` is as in :class:`RandomBowlTasks`.

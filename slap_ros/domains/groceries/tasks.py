@@ -16,10 +16,9 @@ from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.benchtop.hand_motion import HandGoal
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
 from slap_ros.domains.benchtop.room import HIGHEST, ROOM, Station, palm_space, within_reach
-from slap_ros.domains.benchtop.tasks import ANY, BENCH_LIMITS, Range, some_of
+from slap_ros.domains.benchtop.tasks import ANY, BENCH_LIMITS, BenchSettings, Range, some_of
 from slap_ros.domains.groceries.model import BASKET, GRASP_HEIGHT, GROCERY, HALF_WIDTH, IN, NAMES
 from slap_ros.domains.groceries.scenery import BASKET_BODY, FLOOR_HEIGHT, GROCERIES, Grocery
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
@@ -36,7 +35,7 @@ BASKET_LIMITS = {f"basket_{name}": BENCH_LIMITS[name] for name in ("x", "y", "ya
 
 
 @dataclass(frozen=True)
-class RandomGroceryTasks(TaskSettings):
+class RandomGroceryTasks(BenchSettings):
     """Things and the basket are put anywhere within reach where the hand has room.
 
     ``task`` names the thing that is surely there, and the goal that comes with the task: 3 is the
@@ -104,7 +103,7 @@ SLOTS = tuple(
 
 
 @dataclass(frozen=True)
-class PaperGroceryTasks(TaskSettings):
+class PaperGroceryTasks(BenchSettings):
     """In the manner of LIBERO: the basket in its place, each thing near one of six, unturned.
 
     ``task`` is as in :class:`RandomGroceryTasks`.

@@ -15,10 +15,9 @@ from slap_ros.core import Task
 from slap_ros.domains.benchtop.cabinet import CABINET, MIDDLE, cabinet_features
 from slap_ros.domains.benchtop.features import jointed_features, thing_features
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
-from slap_ros.domains.benchtop.tasks import Range
+from slap_ros.domains.benchtop.tasks import BenchSettings, Range
 from slap_ros.domains.make_coffee.model import GOALS
 from slap_ros.domains.make_coffee.scenery import BOTTOM, HOLDER, LID_HIGH, POD, POD_HALF
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import Object, State
 from slap_ros.worlds.contact.features import ROBOT, robot_features
@@ -29,7 +28,7 @@ HAND = hand_at((0.45, 0.0, 0.25), 0.25 * math.pi)
 
 
 @dataclass(frozen=True)
-class CoffeeTasks(TaskSettings):
+class CoffeeTasks(BenchSettings):
     """The cabinet is on the left, the holder on the right. Each setting is a range to sample from.
 
     Args:

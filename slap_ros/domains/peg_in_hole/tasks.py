@@ -14,10 +14,9 @@ from slap_ros.core import Goal, Task
 from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.benchtop.goals import goal
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
-from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, Range
+from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, BenchSettings, Range
 from slap_ros.domains.peg_in_hole.model import HOLE, IN, PEG
 from slap_ros.domains.peg_in_hole.scenery import HOLES, PEG_RADIUS, PEGS, seat, wall_top
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import Object, State
 from slap_ros.worlds.contact.features import ROBOT, robot_features
@@ -36,7 +35,7 @@ GOALS: Mapping[str, Goal] = {
 
 
 @dataclass(frozen=True)
-class PegTasks(TaskSettings):
+class PegTasks(BenchSettings):
     """Where pegs and plates are is sampled for each task, one of each on either side of the arm.
 
     Args:

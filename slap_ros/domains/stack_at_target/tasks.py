@@ -13,10 +13,9 @@ import numpy as np
 
 from slap_ros.core import Task
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
-from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, Range, spread_out
+from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, BenchSettings, Range, spread_out
 from slap_ros.domains.stack_at_target.model import CUBE, GOALS, TARGET
 from slap_ros.domains.stack_at_target.scenery import TARGET_HALF, cube_features, target_features
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.relational import Object, State
 from slap_ros.worlds.contact.features import ROBOT, robot_features
 from slap_ros.worlds.contact.hand import hand_at
@@ -26,7 +25,7 @@ BLOCKER_OFF = 0.005  # from a target's middle, at most, along each axis
 
 
 @dataclass(frozen=True)
-class StackTasks(TaskSettings):
+class StackTasks(BenchSettings):
     """Where cubes and targets stand is sampled for each task.
 
     Args:

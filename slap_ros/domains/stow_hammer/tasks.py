@@ -15,10 +15,9 @@ from slap_ros.core import Task
 from slap_ros.domains.benchtop.cabinet import CABINET, cabinet_features
 from slap_ros.domains.benchtop.features import thing_features
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
-from slap_ros.domains.benchtop.tasks import Range
+from slap_ros.domains.benchtop.tasks import BenchSettings, Range
 from slap_ros.domains.stow_hammer.model import GOALS
 from slap_ros.domains.stow_hammer.scenery import HALF_LENGTH, HAMMER, HEAD_HALF, RADIUS
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
@@ -35,7 +34,7 @@ HAND_HALF = (0.04, 0.095, 0.1)
 
 
 @dataclass(frozen=True)
-class StowTasks(TaskSettings):
+class StowTasks(BenchSettings):
     """A cabinet to either side, and between them two hammers, one behind the other.
 
     Args:

@@ -52,7 +52,7 @@ class ContactLoopWorld:
         self._scene = scene
         self._servo = HandServo(ContactIndex.of(scene, initial.layout), initial, REACH)
         self.plant = MujocoPlant(compiled(scene_spec(scene, initial, motors)), scene, initial)
-        self._controllers = PlantControllers(self.plant, UNCHECKED, scene.forces.grip_n)
+        self._controllers = PlantControllers(self.plant, UNCHECKED, scene.hand.grip_n)
         self._state = self._measured(initial)
 
     @property

@@ -76,7 +76,7 @@ class OpenLoopPlayer:
             raise InvalidParameterError(f"the hand of {recorded.domain.name} has no forces")
         self._scene = scene
         self.plant = MujocoPlant(compiled(scene_spec(scene, initial)), scene, initial)
-        self._controllers = PlantControllers(self.plant, TOLERANCES, scene.forces.grip_n)
+        self._controllers = PlantControllers(self.plant, TOLERANCES, scene.hand.grip_n)
         self.grasps: list[GraspDeviation] = []  # so far
 
     def play(self) -> State:

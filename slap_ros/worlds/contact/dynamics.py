@@ -98,12 +98,12 @@ class ContactDynamics:
         far = self._is_far(now, pull)
         involved = NOTHING if far else self._involved(now, self._sweep(now.hand, pull))
         if involved == NOTHING:
-            alone = own_way(now.hand, pull, self._scene.forces)
+            alone = own_way(now.hand, pull, self._scene.hand)
             return now._replace(hand=alone, held=None), ()
         while True:
             outcome = self._simulation.run(now, pull, involved)
             if not involved.hand:
-                alone = own_way(now.hand, pull, self._scene.forces)
+                alone = own_way(now.hand, pull, self._scene.hand)
                 outcome = replace(outcome, hand=alone)
             wider = self._widened(now, involved, outcome)
             if wider == involved:

@@ -23,23 +23,21 @@ from slap_ros.geometry.pose import (
     multiply,
 )
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
-from slap_ros.worlds.contact.scene import BoxPart, HandForces
+from slap_ros.worlds.contact.hand_model import HandModel
+from slap_ros.worlds.contact.scene import BoxPart
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
 
 HAND_MASS = 1.0  # kg
 FINGER_MASS = 0.5  # kg each: lighter ones are kicked by what they grip
 MASS = HAND_MASS + 2.0 * FINGER_MASS  # kg
 HAND_INERTIA, FINGER_INERTIA = 0.01, 0.001  # kg m², about any axis
-FINGER_SPEED = 0.15  # m/s, at most; faster ones enter what they close on
 
 LEASH = 0.03  # m, from the hand to its target along each axis, at most
 YAW_LEASH = 0.3  # rad, the same about the vertical
 
 SUBSTEPS = 16  # of a control period; a power of two: 1/320 s, and exact
-SHARE = 0.2  # of the way that is left, gone in a substep where the force allows it
+FINGER_SHARE = 0.2  # of a finger's way, gone in a substep where its speed and force allow it
 SUBSTEP_S = CONTROL_PERIOD_S / SUBSTEPS
-_RATE = SHARE / SUBSTEP_S  # per s
-_LEFT_OVER = tuple((1.0 - SHARE) ** k for k in range(SUBSTEPS + 1))
 ARRIVED = 1e-7  # m and rad, and per s: nearer and slower than this, the hand is at its target
 
 # In the hand's frame, at finger position 0: like the shapes of the real one.
@@ -116,7 +114,7 @@ def hand_at(
     )
 
 
-def own_way(hand: HandState, pull: Pose, forces: HandForces) -> HandState:
+def own_way(hand: HandState, pull: Pose, model: HandModel) -> HandState:
     """The hand after a control period in which it touches nothing.
 
     What PyBullet makes of the same, to a few micrometres.
@@ -124,26 +122,26 @@ def own_way(hand: HandState, pull: Pose, forces: HandForces) -> HandState:
     Args:
         hand: Hand at the beginning of the period.
         pull: Pose that the hand is pulled to in this period.
-        forces: Strength of the hand.
+        model: What the hand can do.
     """
-    kick = forces.pull_n / MASS * SUBSTEP_S  # m/s, the most that a substep changes
+    kick = model.pull_n / MASS * SUBSTEP_S  # m/s, the most that a substep changes
     ways = [
-        _pulled(goal - x, v, kick)
+        _pulled(goal - x, v, kick, model.share)
         for goal, x, v in zip(pull.position, hand.pose.position, hand.velocity, strict=True)
     ]
     x, y, z = (goal - left for goal, (left, _) in zip(pull.position, ways, strict=True))
     inertia = HAND_INERTIA + 2.0 * FINGER_INERTIA
-    twist = forces.pull_n / inertia * SUBSTEP_S  # rad/s
+    twist = model.pull_n / inertia * SUBSTEP_S  # rad/s
     turns = [
-        _pulled(left, w, twist)
+        _pulled(left, w, twist, model.share)
         for left, w in zip(rotation_between(hand.pose, pull), hand.angular_velocity, strict=True)
     ]
     back = from_rotation_vector((-turns[0][0], -turns[1][0], -turns[2][0]))
     quaternion = multiply(back, pull.quaternion) if any(r for r, _ in turns) else pull.quaternion
     open_to = FINGER_CLOSED if hand.closing else FINGER_OPEN
-    squeeze = forces.grip_n / FINGER_MASS * SUBSTEP_S
+    squeeze = model.grip_n / FINGER_MASS * SUBSTEP_S
     fingers = [
-        _pulled(open_to - f, v, squeeze, FINGER_SPEED)
+        _pulled(open_to - f, v, squeeze, FINGER_SHARE, model.finger_speed)
         for f, v in zip(hand.fingers, hand.finger_velocities, strict=True)
     ]
     return hand._replace(
@@ -166,26 +164,28 @@ def rotation_between(start: Pose, goal: Pose) -> Vector:
 
 
 def _pulled(
-    left: float, speed: float, kick: float, fastest: float = math.inf
+    left: float, speed: float, kick: float, share: float, fastest: float = math.inf
 ) -> tuple[float, float]:
     """The remaining way along one axis, and the speed, after a control period.
 
-    In each substep the speed becomes that which goes :data:`SHARE` of the way that is left, or as
-    near to it as the force allows.
+    In each substep the speed becomes that which goes a share of the way that is left, or as near
+    to it as the force allows.
 
     Args:
         left: Remaining way at the beginning, m or rad.
         speed: Speed at the beginning, m/s or rad/s.
         kick: Largest change of speed that the force makes in a substep, m/s or rad/s.
+        share: Share of the way that is left, gone in a substep.
         fastest: Largest wanted speed, m/s or rad/s.
     """
+    rate = share / SUBSTEP_S  # per s
     for done in range(SUBSTEPS):
-        wanted = left * _RATE
+        wanted = left * rate
         change = wanted - speed
-        if -kick <= change <= kick and abs(wanted) <= min(fastest, kick / SHARE):
+        if -kick <= change <= kick and abs(wanted) <= min(fastest, kick / share):
             # From here on the force always suffices: each substep leaves the same share.
-            left *= _LEFT_OVER[SUBSTEPS - done]
-            speed = left * _RATE / (1.0 - SHARE)
+            left *= (1.0 - share) ** (SUBSTEPS - done)
+            speed = left * rate / (1.0 - share)
             break
         if not -fastest <= wanted <= fastest:
             change = math.copysign(fastest, wanted) - speed

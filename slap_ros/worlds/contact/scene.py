@@ -24,6 +24,7 @@ from slap_ros.geometry.pose import (
     rotate,
 )
 from slap_ros.worlds.bodies import GREY, WOOD, Colour, RigidBody
+from slap_ros.worlds.contact.hand_model import QUICK, HandModel
 
 THING_FRICTION = 1.0  # 1; that of a pair of bodies is the product of both
 TABLE_FRICTION = 0.9  # 1
@@ -250,34 +251,21 @@ Body = Compound | JointedBody
 
 
 @dataclass(frozen=True)
-class HandForces:
-    """How strong the hand is.
-
-    Args:
-        pull_n: The largest force along each axis that pulls the hand to its target.
-        grip_n: The force with which each finger closes or opens.
-    """
-
-    pull_n: float = 60.0
-    grip_n: float = 40.0
-
-
-@dataclass(frozen=True)
 class ContactScene:
     """All bodies around a Panda whose base is at the origin.
 
     Args:
         bodies: Bodies of the scene. The order of those that move is part of the physics.
-        forces: Strength of the hand.
+        hand: What the hand can do.
         floor_m: Height of the floor, which catches what falls off the table.
 
     Raises:
         InvalidDomainError: Two bodies share a name, a body has no parts or sizes that nothing
-            has, a joint has no range, or a force is not above 0.
+            has, or a joint has no range.
     """
 
     bodies: tuple[Body, ...]
-    forces: HandForces = HandForces()
+    hand: HandModel = QUICK
     floor_m: float = -0.425
 
     def __post_init__(self) -> None:
@@ -286,9 +274,6 @@ class ContactScene:
             raise InvalidDomainError(f"a scene has two bodies named {', '.join(twice)}")
         for body in self.bodies:
             _require_buildable(body)
-        for name, force in (("pull", self.forces.pull_n), ("grip", self.forces.grip_n)):
-            if not 0.0 < force < math.inf:
-                raise InvalidDomainError(f"the hand's {name} must be above 0 N, not {force}")
 
     @cached_property
     def free(self) -> tuple[Compound, ...]:

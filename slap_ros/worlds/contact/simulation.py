@@ -20,7 +20,7 @@ from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector
 from slap_ros.worlds.bullet import pybullet
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
 from slap_ros.worlds.contact.contacts import ContactPoint, Side, Surface
-from slap_ros.worlds.contact.hand import FINGER_SPEED, MASS, SHARE, SUBSTEPS, HandState
+from slap_ros.worlds.contact.hand import FINGER_SHARE, MASS, SUBSTEPS, HandState
 from slap_ros.worlds.contact.involved import Involved
 from slap_ros.worlds.contact.scene import (
     BoxPart,
@@ -43,7 +43,6 @@ from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
 GRAVITY = 9.81  # m/s², downwards
 LIFT = (0.0, 0.0, GRAVITY * MASS)  # N, cancels the hand's weight
 PALM_FRICTION = 0.9  # 1
-FINGER_FRICTION = 2.0  # 1, of rubber
 FINGER_SPINNING = 0.005  # m, of pads that give way: a rod touches them in more than one point
 ROLLING = 5e-4  # m, of what things lie on; without it, PyBullet's cylinders roll ever faster
 COUPLING_N = 50.0  # with which the fingers are kept at the same distance from the middle
@@ -203,10 +202,10 @@ class ContactSimulation:
             pybullet.resetJointState(self._hand, finger, position, 0.0, client)
 
     def _set_hand(self, hand: HandState, pull: Pose) -> None:
-        client, forces = self.client, self.scene.forces
+        client, model = self.client, self.scene.hand
         pybullet.resetBasePositionAndOrientation(self._hand, *hand.pose, client)
         pybullet.resetBaseVelocity(self._hand, hand.velocity, hand.angular_velocity, client)
-        pybullet.changeConstraint(self._pull, *pull, maxForce=forces.pull_n, physicsClientId=client)
+        pybullet.changeConstraint(self._pull, *pull, maxForce=model.pull_n, physicsClientId=client)
         # It lasts through all substeps.
         pybullet.applyExternalForce(
             self._hand, BASE, LIFT, hand.pose.position, pybullet.WORLD_FRAME, client
@@ -221,10 +220,10 @@ class ContactSimulation:
                 finger,
                 pybullet.POSITION_CONTROL,
                 targetPosition=wanted,
-                force=forces.grip_n / MOTOR_SUBSTEPS,
-                positionGain=SHARE,
+                force=model.grip_n / MOTOR_SUBSTEPS,
+                positionGain=FINGER_SHARE,
                 velocityGain=1.0,
-                maxVelocity=FINGER_SPEED,
+                maxVelocity=model.finger_speed,
                 physicsClientId=client,
             )
 
@@ -248,7 +247,7 @@ class ContactSimulation:
         hand = self._load(hand_urdf(), fixed=False)
         self._places[hand] = self._next_parking()
         for link, side in ((BASE, Side.PALM), (LEFT, Side.LEFT_FINGER), (RIGHT, Side.RIGHT_FINGER)):
-            friction = PALM_FRICTION if side is Side.PALM else FINGER_FRICTION
+            friction = PALM_FRICTION if side is Side.PALM else self.scene.hand.friction
             self._touchable(hand, link, Surface(side), friction)
             pybullet.changeDynamics(hand, link, jointDamping=0.0, physicsClientId=self.client)
         coupling = pybullet.createConstraint(
@@ -284,6 +283,7 @@ class ContactSimulation:
             self._places[self._hand],
             physicsClientId=self.client,
         )
+        pybullet.changeConstraint(pull, erp=self.scene.hand.share, physicsClientId=self.client)
         return pull
 
     # -- bodies ---------------------------------------------------------------------------------
