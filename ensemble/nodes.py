@@ -11,7 +11,12 @@ from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Any
 
-from ensemble.robot_parameters import BEFORE_MUJOCO, BEFORE_MUJOCO_AT_A_BENCH
+from ensemble.robot_parameters import (
+    BEFORE_MUJOCO,
+    BEFORE_MUJOCO_AT_A_BENCH,
+    MUJOCO_AT_A_BENCH,
+    OF_JOINTS,
+)
 from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, MUJOCO, SIM
 from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.skills.domain_choice import DomainChoice
@@ -158,7 +163,9 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
     if settings.servo:
         passing = {"pace": settings.mujoco.get("pace", 1.0)}
         servo = task | dict(BEFORE_MUJOCO_AT_A_BENCH) | passing | dict(settings.bridge)
-        return {"robot_bridge.mujoco": task | dict(settings.mujoco), "robot_bridge.servo": servo}
+        pulled = {} if settings.mujoco.keys() & OF_JOINTS else dict(MUJOCO_AT_A_BENCH)
+        robot = task | pulled | dict(settings.mujoco)
+        return {"robot_bridge.mujoco": robot, "robot_bridge.servo": servo}
     if settings.world == MUJOCO:
         camera = bool(settings.mujoco.get("camera"))
         before = dict(BEFORE_MUJOCO) | (BEFORE_CAMERA if camera else {})

@@ -31,6 +31,8 @@ BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
 )
 # At a bench fingers press as hard as those of the contact world (``HandModel``).
 BEFORE_MUJOCO_AT_A_BENCH = MappingProxyType({**BEFORE_MUJOCO, "gripper_effort": 40.0})
+MUJOCO_AT_A_BENCH = MappingProxyType({"impedance": 3000.0})  # of the robot itself, N/m
+OF_JOINTS = frozenset({"stiffness", "lag"})  # who sets one of these has joints pulled instead
 Parameters = Mapping[str, str | int | float | tuple[float, ...]]
 WORKSPACE = (*Workspace().low, *Workspace().high)
 BENCH = (0.2, -0.5, 0.0, 0.8, 0.5, 0.9)  # m: tables at a bench are as high as the arm's base
@@ -237,6 +239,7 @@ class MujocoRobotParameters(CameraParameters, SimulatedRobotParameters):
     trajectory_topic: str = parameter(
         TRAJECTORY_TOPIC, "topic of trajectories that replace one another"
     )
+    impedance: float = parameter(0.0, "N/m that pull the hand; 0: its joints are pulled", high=1e5)
     stiffness: float = parameter(1.0, "of the arm's joints, as a factor", low=0.01, high=1e3)
     lag: float = parameter(0.07, "s, by which a joint in motion is late", low=0.001, high=10.0)
 

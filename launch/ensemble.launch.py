@@ -211,6 +211,8 @@ def _parameter_files(given: Mapping[str, str]) -> list[str]:
     if given["world"] != "sim":
         files.append(_config() / "robot.yaml")
     files += [_config() / name for name in CONFIGURED.get(given["world"], ())]
+    if given["servo"] == "true":
+        files.append(_config() / "servo.yaml")
     if given["world"] == "mujoco" and given["camera"] == "true":
         files.append(_config() / "camera.yaml")
     if "params_file" in given:

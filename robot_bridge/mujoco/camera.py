@@ -22,8 +22,8 @@ from robot_bridge.transforms import transform
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import State
-from slap_ros.robot.mujoco.arm import ArmMotors
 from slap_ros.robot.mujoco.camera import tagged_plant
+from slap_ros.robot.mujoco.impedance import arm_control
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.mujoco.rendering_process import Picture, RenderingProcess, Shot
 from slap_ros.robot.scene_config import read_scene_config
@@ -53,8 +53,8 @@ def plant_with_camera(
             f"{domain.name} --seed {settings.seed} --tags FOLDER, then --scene FOLDER/scene.yaml"
         )
     tags = placed_tags(read_scene_config(Path(settings.scene), domain))
-    motors = ArmMotors(settings.stiffness, settings.lag)
-    return tagged_plant(domain, initial, tags, settings.pinhole, settings.optical_pose, motors)
+    control = arm_control(settings.impedance, settings.stiffness, settings.lag)
+    return tagged_plant(domain, initial, tags, settings.pinhole, settings.optical_pose, control)
 
 
 class CameraPublisher:

@@ -124,7 +124,8 @@ class MujocoArmController:
         await pause(self._node, self._noise.delay_s())
         self._goal.end(PREEMPTED)
         plant, tolerances = self._plant, self._usual_tolerances
-        self._tracker.start(points, tolerances, plant.time_s, plant.joints, plant.joint_velocities)
+        taken = plant.control.replacing(points)
+        self._tracker.start(taken, tolerances, plant.time_s, plant.joints, plant.joint_velocities)
 
     def _require_to_come(self, goal: FollowJointTrajectory.Goal) -> None:
         """Refuse a trajectory that was to end in the past."""

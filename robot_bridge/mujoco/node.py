@@ -20,6 +20,8 @@ ROS Parameters:
     goal_time (double, 1.0): s, by which the arm may arrive late; 0: any time.
     trajectory_topic (string, "ARM_arm_controller/joint_trajectory"): topic of trajectories that
         replace one another, without an answer; ARM in it is replaced by the parameter arm.
+    impedance (double, 0.0): N/m, with which the hand is pulled to where joint positions have it,
+        by 60 N at most along each axis; 0: the joints themselves are pulled there.
     stiffness (double, 1.0): of the arm's joints, as a factor; the largest torques stay.
     lag (double, 0.07): s, by which a joint in motion is behind its command.
     latency (double, 0.02), jitter (double, 0.0): s, of goals and detections.
@@ -73,7 +75,8 @@ from ensemble.steady_time import create_timer
 from robot_bridge.mujoco.controllers import MujocoArmController, MujocoGripperController
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.sensors import DetectionPublisher, JointStatePublisher
-from slap_ros.robot.mujoco.arm import PERIOD_S, ArmMotors
+from slap_ros.robot.mujoco.arm import PERIOD_S
+from slap_ros.robot.mujoco.impedance import arm_control
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.skills.domain_choice import open_domain
 
@@ -110,8 +113,8 @@ class MujocoRobot(Node):
             self._plant, model = plant_with_camera(domain, initial, settings)
             self._camera = CameraPublisher(self, self._plant, model, settings)
         else:
-            motors = ArmMotors(settings.stiffness, settings.lag)
-            self._plant = MujocoPlant.of(domain, initial, motors)
+            control = arm_control(settings.impedance, settings.stiffness, settings.lag)
+            self._plant = MujocoPlant.of(domain, initial, control)
             self._detections = DetectionPublisher(self, self._plant, noise, settings)
         self._counts = Counter(motions=0, replaced=0, grips=0, refused=0, aborted=0, canceled=0)
         self._arm = MujocoArmController(self, self._plant, noise, settings, self._counts)

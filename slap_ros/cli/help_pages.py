@@ -70,6 +70,7 @@ PANELS: Mapping[str, str] = {
             "robot",
             "dry_run",
             "yes",
+            "impedance",
             "stiffness",
             "lag",
         ),

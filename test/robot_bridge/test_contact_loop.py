@@ -21,13 +21,23 @@ from slap_ros.worlds.panda import grasp_pose
 pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")
 
-from slap_ros.robot.mujoco.arm import ARM_JOINTS, STIFFNESS, TORQUE, ArmMotors, arm_spec
+from slap_ros.robot.mujoco.arm import (
+    ARM_JOINTS,
+    JOINT_POSITIONS,
+    STIFFNESS,
+    TORQUE,
+    ArmMotors,
+    arm_spec,
+)
 from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld
+from slap_ros.robot.mujoco.engine import mujoco
+from slap_ros.robot.mujoco.impedance import FORCE, HandImpedance
 from slap_ros.robot.mujoco.model import scene_around
 
 SEED = 300
 AHEAD = np.array([0.02, 0.0, 0.0, 0.0, 0.0])  # m, m, m, rad, 1
 CLOSE = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+DOWN = np.array([0.0, 0.0, -0.02, 0.0, 0.0])
 STAY = np.zeros(5)
 STIFF = ArmMotors(stiffness=10.0, lag_s=0.015)  # the lag of the contact world's own hand
 
@@ -38,8 +48,8 @@ def domain():
     return open_domain(DomainChoice("stack_at_target", skills=DEMONSTRATOR, measured=True))
 
 
-def loop_world(domain, motors=None):
-    return ContactLoopWorld(domain, domain.task(SEED).initial_state, motors)
+def loop_world(domain, control=JOINT_POSITIONS):
+    return ContactLoopWorld(domain, domain.task(SEED).initial_state, control)
 
 
 def snapshot(world, domain):
@@ -97,8 +107,8 @@ def test_fingers_close_while_the_arm_moves(domain):
 
 def test_a_stiffer_arm_lags_less_and_has_a_pandas_torques(domain):
     behind = []
-    for motors in (None, STIFF):
-        world = loop_world(domain, motors)
+    for control in (JOINT_POSITIONS, STIFF):
+        world = loop_world(domain, control)
         for _ in range(3):
             world.step(AHEAD)
         hand = snapshot(world, domain).hand
@@ -112,21 +122,66 @@ def test_a_stiffer_arm_lags_less_and_has_a_pandas_torques(domain):
         assert soft.forcerange.tolist() == hard.forcerange.tolist() == [-TORQUE[i], TORQUE[i]]
 
 
-def test_the_same_actions_give_the_same_states_to_the_bit(domain):
+@pytest.mark.parametrize("control", [JOINT_POSITIONS, HandImpedance()])
+def test_the_same_actions_give_the_same_states_to_the_bit(domain, control):
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (12, 5)) * [0.02, 0.02, 0.02, 0.15, 1.0]
     states = []
     for _ in range(2):
-        world = loop_world(domain)
+        world = loop_world(domain, control)
         states.append([world.step(action).data.tobytes() for action in actions])
     assert states[0] == states[1]
 
 
-def solved(domain, motors, seed=SEED):
+def pressed_n(world):
+    """The force with which fingers press on the table, N."""
+    plant, wrench, total = world.plant, np.zeros(6), 0.0
+    table = plant._model.body("table").id
+    for i in range(plant._data.ncon):
+        if table in plant._model.geom_bodyid[plant._data.contact[i].geom]:
+            mujoco.mj_contactForce(plant._model, plant._data, i, wrench)
+            ahead, aside, other = plant._data.contact[i].frame.reshape(3, 3) * wrench[:3, None]
+            total += abs(float((ahead + aside + other)[2]))
+    return total
+
+
+def test_an_impedance_presses_with_limited_force_and_stiff_joints_with_more(domain):
+    """The hand is told to be 3 cm inside the table, as skills tell it that press on a handle."""
+    forces = []
+    for control in (HandImpedance(), STIFF):
+        world = loop_world(domain, control)
+        for _ in range(40):
+            world.step(DOWN)
+        hand = snapshot(world, domain).hand
+        assert hand.pose.position[2] - hand.target[2] == pytest.approx(0.03, abs=1e-3)
+        forces.append(pressed_n(world))
+    assert 0.8 * FORCE < forces[0] < 1.1 * FORCE
+    assert forces[1] > 2.0 * FORCE
+
+
+def test_a_pandas_hand_in_the_contact_world_goes_as_the_impedance_pulls_it():
+    """That is what ``hand=panda`` is: the planner's model of this arm."""
+    panda = open_domain(DomainChoice("stack_at_target", "fair:hand=panda", DEMONSTRATOR))
+    plant, model = (
+        loop_world(panda, HandImpedance()),
+        panda.make_world(panda.task(SEED).initial_state),
+    )
+    for step in range(14):
+        action = AHEAD * (0.5 if step < 8 else 0.0)
+        plant.step(action)
+        model.step(action)
+        there, here = (snapshot(world, panda).hand for world in (plant, model))
+        assert there.target == pytest.approx(here.target, abs=1e-9)
+        assert there.pose.position == pytest.approx(here.pose.position, abs=3e-3)
+    assert there.pose.position == pytest.approx(there.target, abs=1e-3)
+    model.close()
+
+
+def solved(domain, control, seed=SEED):
     return solve_on_robot(
         domain,
         domain.task(seed),
         lambda domain, state: make_planner("lazy", domain, state),
-        lambda domain, state: ContactLoopWorld(domain, state, motors),
+        lambda domain, state: ContactLoopWorld(domain, state, control),
     )
 
 
@@ -200,4 +255,6 @@ def test_what_the_loop_is_not_for_is_named():
         ArmMotors(stiffness=0.0)
     with pytest.raises(InvalidParameterError, match="lag_s"):
         ArmMotors(lag_s=math.nan)
+    with pytest.raises(InvalidParameterError, match="impedance is -1"):
+        HandImpedance(-1.0)
     assert ROBOT not in tower.types

@@ -24,7 +24,8 @@ def study(domain, output, *more):
     ("more", "said"),
     [
         (["--stiffness", "0"], "stiffness of an arm's motors is 0.0"),
-        (["--lag", "-1"], "lag_s of an arm's motors is -1.0"),
+        (["--impedance", "-1"], "stiffness of a hand's impedance is -1.0"),
+        (["--stiffness", "1", "--lag", "-1"], "lag_s of an arm's motors is -1.0"),
     ],
 )
 def test_an_arm_that_there_is_not_is_refused(tmp_path, more, said):
@@ -48,19 +49,21 @@ def test_without_the_extra_nothing_is_solved(monkeypatch, tmp_path):
 
 
 def test_the_contact_world_and_each_arm_have_a_row_for_all_skills(tmp_path):
-    more = ["--goal", "training", "--stiffness", "1", "--stiffness", "4"]
+    more = ["--goal", "training", "--impedance", "2000", "--stiffness", "4"]
     done = study("stack_at_target", tmp_path, *more)
     assert done.exit_code == 0, done.stderr
     data = json.loads((tmp_path / "closed_loop_stack_at_target.json").read_text())
     rows = data["found"]["rows"]
-    assert [row["stiffness"] for row in rows] == [None, 1.0, 4.0] * 2
+    arms = [(row["impedance"], row["stiffness"]) for row in rows]
+    assert arms == [(None, None), (2000.0, None), (None, 4.0)] * 2
     assert [row["skills"] for row in rows] == ["manual, manual, seed 0"] * 3 + ["demonstrator"] * 3
     scripts = [row["trials"][0] for row in rows[3:]]
     assert all(trial["success"] for trial in scripts)
     lengths = [trial["plan_length"] for trial in scripts]
-    assert lengths[0] < lengths[2] <= lengths[1]  # what lags is later
+    assert lengths[0] < lengths[1] < lengths[2]  # what lags is later
     page = (tmp_path / "closed_loop_stack_at_target.md").read_text()
     assert "| training | demonstrator | × 4 | 1 of 1 " in page
+    assert "| training | demonstrator | 2000 N/m | 1 of 1 " in page
     assert "| training | demonstrator | contact world | 1 of 1 " in page
 
 

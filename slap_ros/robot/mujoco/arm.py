@@ -10,11 +10,16 @@ gripper's do, and press with a force that is set.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import read_text
+from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.worlds.bullet import PANDA
 from slap_ros.worlds.panda import JOINTS
@@ -31,12 +36,12 @@ TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # Nm, Franka's data sheet
 ARMATURE = 0.1  # kg m², of a motor, seen from the joint
 JOINT_DAMPING = 1.0  # Nm s/rad
 
-FINGER_STIFFNESS = 4000.0  # N/m
-FINGER_DAMPING = 80.0  # N s/m
 FINGER_ARMATURE = 0.1  # kg
 FINGER_FORCE = 70.0  # N, of each finger
 LARGEST_FINGER_FORCE = 70.0  # N, Franka's data sheet
 FINGER_SPEED = 0.05  # m/s, of each finger, Franka's data sheet
+
+Numbers = Sequence[float] | NDArray[np.float64]
 
 # Who touches whom: the arm touches everything but itself.
 ARM_CONTACTS = {"contype": 2, "conaffinity": 1}
@@ -45,6 +50,43 @@ BODY_CONTACTS = {"contype": 1, "conaffinity": 3}
 SOLREF = (2.0 * PERIOD_S, 1.0)  # s, 1: time constant and damping ratio
 SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
 NO_SLIP_ITERATIONS = 5  # of the solver that takes the creeping out of friction
+
+
+class MotorLaw(NamedTuple):
+    """What makes the torque of a joint's motor, besides its limit."""
+
+    gain: float  # of the command
+    stiffness: float  # Nm/rad, against the joint's position
+    damping: float  # Nm s/rad
+
+
+class ArmControl(Protocol):
+    """How an arm goes to joint positions."""
+
+    def motor(self, usual: float) -> MotorLaw:
+        """The motor of a joint that is usually so stiff, Nm/rad."""
+        ...
+
+    def commands(self, told: Numbers, joints: Numbers, velocities: Numbers) -> Numbers:
+        """What the motors are told for a period, shape (7,).
+
+        Args:
+            told: Joint positions to go to, rad, shape (7,).
+            joints: Joint positions, rad, shape (7,).
+            velocities: Joint velocities, rad/s, shape (7,).
+        """
+        ...
+
+    def replacing(self, points: Sequence[TrajectoryPoint]) -> Sequence[TrajectoryPoint]:
+        """A short trajectory as the arm follows it that replaces the one before.
+
+        Args:
+            points: Points of the trajectory.
+        """
+        ...
+
+
+FINGER_MOTOR = MotorLaw(4000.0, 4000.0, 80.0)  # N/m, N/m, N s/m
 
 
 @dataclass(frozen=True)
@@ -68,14 +110,29 @@ class ArmMotors:
             if not 0.0 < value < math.inf:
                 raise InvalidParameterError(f"{name} of an arm's motors is {value}, not above 0")
 
+    def motor(self, usual: float) -> MotorLaw:
+        """A motor that pulls its joint to the command."""
+        stiffness = self.stiffness * usual
+        return MotorLaw(stiffness, stiffness, self.lag_s * stiffness)
 
-def arm_spec(motors: ArmMotors | None = None) -> Any:
+    def commands(self, told: Numbers, joints: Numbers, velocities: Numbers) -> Numbers:  # noqa: ARG002
+        """The joint positions themselves."""
+        return told
+
+    def replacing(self, points: Sequence[TrajectoryPoint]) -> Sequence[TrajectoryPoint]:
+        """The trajectory itself: stiff joints that jumped would jerk."""
+        return points
+
+
+JOINT_POSITIONS = ArmMotors()
+
+
+def arm_spec(control: ArmControl = JOINT_POSITIONS) -> Any:
     """A new ``mujoco.MjSpec`` with the arm alone, its base at the origin.
 
     Args:
-        motors: How hard its joints are held.
+        control: How it goes to joint positions.
     """
-    motors = motors or ArmMotors()
     spec = mujoco.MjSpec.from_string(_urdf())
     _set_options(spec.option)
     for body in spec.bodies:
@@ -89,10 +146,9 @@ def arm_spec(motors: ArmMotors | None = None) -> Any:
         joint.damping = [0.0 if finger else JOINT_DAMPING, 0.0, 0.0]
         joint.actfrclimited = False  # the URDF's efforts: 20 N of each finger; motors have theirs
     for name, usual, torque in zip(ARM_JOINTS, STIFFNESS, TORQUE, strict=True):
-        stiffness = motors.stiffness * usual
-        _add_motor(spec, name, stiffness, motors.lag_s * stiffness, torque)
+        _add_motor(spec, name, control.motor(usual), torque)
     for name in FINGER_JOINTS:
-        _add_motor(spec, name, FINGER_STIFFNESS, FINGER_DAMPING, FINGER_FORCE)
+        _add_motor(spec, name, FINGER_MOTOR, FINGER_FORCE)
     _couple_fingers(spec)
     return spec
 
@@ -120,14 +176,14 @@ def _set_options(option: Any) -> None:
     option.noslip_iterations = NO_SLIP_ITERATIONS
 
 
-def _add_motor(spec: Any, joint: str, stiffness: float, damping: float, force: float) -> None:
-    """A motor that pulls a joint to its command: Nm or N per rad or m."""
+def _add_motor(spec: Any, joint: str, law: MotorLaw, force: float) -> None:
+    """The motor of a joint, with the most that it can do: Nm of the arm's, N of the fingers'."""
     motor = spec.add_actuator()
     motor.name, motor.target, motor.trntype = joint, joint, mujoco.mjtTrn.mjTRN_JOINT
     motor.gaintype = mujoco.mjtGain.mjGAIN_FIXED
     motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-    motor.gainprm[0] = stiffness
-    motor.biasprm[1], motor.biasprm[2] = -stiffness, -damping
+    motor.gainprm[0] = law.gain
+    motor.biasprm[1], motor.biasprm[2] = -law.stiffness, -law.damping
     motor.forcerange, motor.forcelimited = [-force, force], True
 
 

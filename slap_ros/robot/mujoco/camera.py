@@ -20,7 +20,7 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, InvalidSceneError
 from slap_ros.geometry.pose import Pose, Quaternion, multiply
 from slap_ros.relational import State
-from slap_ros.robot.mujoco.arm import ArmMotors
+from slap_ros.robot.mujoco.arm import JOINT_POSITIONS, ArmControl
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.plant import MujocoPlant
@@ -51,7 +51,7 @@ def tagged_plant(
     tags: Sequence[PlacedTag],
     camera: PinholeCamera,
     pose: Pose,
-    motors: ArmMotors | None = None,
+    control: ArmControl = JOINT_POSITIONS,
 ) -> tuple[MujocoPlant, Any]:
     """A plant whose objects have tags, and its model with a camera.
 
@@ -61,17 +61,17 @@ def tagged_plant(
         tags: Tags, and where they are.
         camera: Intrinsics of the camera.
         pose: Pose of its optical frame in the robot's base.
-        motors: How hard the arm's joints are held.
+        control: How the arm goes to joint positions.
 
     Raises:
         InvalidSceneError: MuJoCo cannot express the scene, or a tag is on no object of it.
     """
     scene = scene_around(domain, initial)
-    spec = scene_spec(scene, initial, motors)
+    spec = scene_spec(scene, initial, control)
     add_camera(spec, camera, pose)
     add_tags(spec, tags)
     model = compiled(spec)
-    return MujocoPlant(model, scene, initial), model
+    return MujocoPlant(model, scene, initial, control), model
 
 
 def add_camera(spec: Any, camera: PinholeCamera, pose: Pose) -> None:

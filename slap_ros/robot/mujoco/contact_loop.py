@@ -17,7 +17,7 @@ from slap_ros.core import Action, Domain
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.relational import GroundAtom, State
 from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
-from slap_ros.robot.mujoco.arm import PERIOD_S, ArmMotors
+from slap_ros.robot.mujoco.arm import JOINT_POSITIONS, PERIOD_S, ArmControl
 from slap_ros.robot.mujoco.contact_state import measured_state
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.plant import MujocoPlant
@@ -36,22 +36,26 @@ class ContactLoopWorld:
     Args:
         domain: Domain of the contact world.
         initial: State of a task, in which the plant begins.
-        motors: How hard the arm's joints are held.
+        control: How the arm goes to joint positions.
 
     Raises:
         InvalidSceneError: MuJoCo cannot express the scene.
         InvalidParameterError: It is a domain of another world.
     """
 
-    def __init__(self, domain: Domain, initial: State, motors: ArmMotors | None = None) -> None:
+    def __init__(
+        self, domain: Domain, initial: State, control: ArmControl = JOINT_POSITIONS
+    ) -> None:
         scene = scene_around(domain, initial)
         if not isinstance(scene, ContactScene):
             raise InvalidParameterError(
                 f"the hand of {domain.name} has no forces: its robot in MuJoCo is ClosedLoopWorld"
             )
-        self._scene = scene
+        self._scene, self._control = scene, control
         self._servo = HandServo(ContactIndex.of(scene, initial.layout), initial, REACH)
-        self.plant = MujocoPlant(compiled(scene_spec(scene, initial, motors)), scene, initial)
+        self.plant = MujocoPlant(
+            compiled(scene_spec(scene, initial, control)), scene, initial, control
+        )
         self._controllers = PlantControllers(self.plant, UNCHECKED, scene.hand.grip_n)
         self._state = self._measured(initial)
 
@@ -78,7 +82,7 @@ class ContactLoopWorld:
         if command.gripper is not GripperAction.KEEP:
             closes = command.gripper is GripperAction.CLOSE
             self._controllers.command_fingers(GAP_SHUT if closes else GAP_OPEN)
-        self._controllers.replace_motion(command.points)
+        self._controllers.replace_motion(self._control.replacing(command.points))
         for _ in range(PERIODS):
             self._controllers.pass_period()
         self._state = self._measured(self._state)

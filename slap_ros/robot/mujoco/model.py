@@ -18,7 +18,14 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, InvalidSceneError
 from slap_ros.geometry.pose import ORIGIN, Pose, Vector
 from slap_ros.relational import State
-from slap_ros.robot.mujoco.arm import BODY_CONTACTS, SOLIMP, SOLREF, ArmMotors, arm_spec
+from slap_ros.robot.mujoco.arm import (
+    BODY_CONTACTS,
+    JOINT_POSITIONS,
+    SOLIMP,
+    SOLREF,
+    ArmControl,
+    arm_spec,
+)
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.placed_scene import (
     PandaScene,
@@ -62,7 +69,7 @@ def scene_around(domain: Domain, state: State) -> PandaScene:
         return world.scene
 
 
-def scene_spec(scene: PandaScene, state: State, motors: ArmMotors | None = None) -> Any:
+def scene_spec(scene: PandaScene, state: State, control: ArmControl = JOINT_POSITIONS) -> Any:
     """The model as a ``mujoco.MjSpec`` that is not compiled yet: cameras, say, can be added.
 
     Each body of the scene is a body of its name in the model; of a jointed body, that is the frame,
@@ -71,13 +78,13 @@ def scene_spec(scene: PandaScene, state: State, motors: ArmMotors | None = None)
     Args:
         scene: Bodies of the scene, and their shapes.
         state: Where they are, and what they are made of.
-        motors: How hard the arm's joints are held.
+        control: How the arm goes to joint positions.
 
     Raises:
         InvalidSceneError: MuJoCo cannot express a body; says which, and why.
         InvalidStateError: The state does not have the scene's bodies.
     """
-    spec, begun = arm_spec(motors), PlacedScene.of(scene, state)
+    spec, begun = arm_spec(control), PlacedScene.of(scene, state)
     for placed in begun.bodies:
         _add(spec, placed)
     for jointed in begun.jointed:

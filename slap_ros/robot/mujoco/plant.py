@@ -22,9 +22,10 @@ from slap_ros.robot.mujoco.arm import (
     FINGER_FORCE,
     FINGER_JOINTS,
     FINGER_SPEED,
+    JOINT_POSITIONS,
     LARGEST_FINGER_FORCE,
     PERIOD_S,
-    ArmMotors,
+    ArmControl,
 )
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
@@ -53,10 +54,17 @@ class MujocoPlant:
         model: Compiled ``mujoco.MjModel`` of a scene.
         scene: Bodies of the scene.
         state: State to begin in; what moves there comes to rest first.
+        control: How the arm goes to joint positions, as the model has it.
     """
 
-    def __init__(self, model: Any, scene: PandaScene, state: State) -> None:
-        self._model, self._data = model, mujoco.MjData(model)
+    def __init__(
+        self,
+        model: Any,
+        scene: PandaScene,
+        state: State,
+        control: ArmControl = JOINT_POSITIONS,
+    ) -> None:
+        self._model, self._data, self.control = model, mujoco.MjData(model), control
         self._names = [body.name for body in scene.free]
         self._bodies = [model.body(name).id for name in self._names]
         self._arm_at = [model.joint(name).qposadr[0] for name in ARM_JOINTS]
@@ -76,20 +84,20 @@ class MujocoPlant:
         self._settle()
 
     @classmethod
-    def of(cls, domain: Domain, state: State, motors: ArmMotors | None = None) -> MujocoPlant:
+    def of(cls, domain: Domain, state: State, control: ArmControl = JOINT_POSITIONS) -> MujocoPlant:
         """The plant of a domain's state.
 
         Args:
             domain: Domain with a Panda.
             state: State to begin in.
-            motors: How hard the arm's joints are held.
+            control: How the arm goes to joint positions.
 
         Raises:
             InvalidSceneError: MuJoCo cannot express a body.
             InvalidParameterError: The domain has no Panda.
         """
         scene = scene_around(domain, state)
-        return cls(compiled(scene_spec(scene, state, motors)), scene, state)
+        return cls(compiled(scene_spec(scene, state, control)), scene, state, control)
 
     # -- what is measured -----------------------------------------------------------------------
 
@@ -193,7 +201,7 @@ class MujocoPlant:
 
     def command(self, joints: Sequence[float] | Array) -> None:
         """Have the arm pulled to joint positions, rad, from now on."""
-        self._data.ctrl[:JOINTS] = joints
+        self._told = joints
 
     def command_fingers(self, finger: float, force: float = FINGER_FORCE) -> None:
         """Have the fingers move from now on, no faster than a real gripper's.
@@ -211,6 +219,9 @@ class MujocoPlant:
 
     def step(self) -> None:
         """Let a period pass."""
+        self._data.ctrl[:JOINTS] = self.control.commands(
+            self._told, self._data.qpos[self._arm_at], self._data.qvel[self._arm_speeds]
+        )
         self._command_fingers_on()
         mujoco.mj_step(self._model, self._data)
 

@@ -43,6 +43,8 @@ from slap_ros.worlds.contact.features import ROBOT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from slap_ros.robot.mujoco.arm import ArmControl
+
 OWN = "contact world"
 MEASURED = f"""\
 Each task is planned in the contact world, whose hand acts by forces, and executed by a Panda in
@@ -52,18 +54,50 @@ its hand. Nothing waits for the arm to arrive or for fingers to close. The measu
 joints, the hand's pose and velocity that follow from them, fingers, exact poses and velocities of
 things, what both fingers press on, and where the hand was told to be. Where a skill does not end as
 planned, the planner plans again from the measured state, {MAX_REPLANS} times at most. The plant
-knows nothing of the plan: nothing is welded, and no pose is put right. *Arm* is how many times as
-stiff as the usual arm of `slap run --world mujoco` its joints are (500 to 1100 Nm/rad), with the
-torques of a Panda; the first row of each choice of skills is the contact world itself. A joint in
-motion is behind its command by `lag`, whatever its stiffness; the contact world's hand is by 15 ms.
+knows nothing of the plan: nothing is welded, and no pose is put right. *Arm* is how stiff it is,
+with the torques of a Panda: the hand is pulled by so many N/m, and by 60 N at most along each axis
+(impedance), or the joints are so many times as stiff as the usual arm of `slap run --world mujoco`
+(500 to 1100 Nm/rad) and, in motion, behind their commands by `lag`. The first row of each choice of
+skills is the contact world itself, with the hand of the preset (`hand=panda`, or the quick one).
 *Solved* is the share of the tasks whose goal holds in the measured state, with Wilson's 95 %
 interval. Steps are control periods, over solved tasks; replans are over all tasks; both are
 mean ± sample standard deviation. *Not solved* counts the others by error code. Skills are named by
 what proposed their operators, what made their rewards, and the seed of their training; nothing was
-trained again. The demonstrator's scripts know the whole state. The hands differ as they do
-[open loop](../mujoco.md#open-loop-at-a-bench); the Panda's fingers take three times as long to
-close."""
+trained again. The demonstrator's scripts know the whole state. Fingers differ as they do
+[open loop](../mujoco.md#open-loop-at-a-bench)."""
 COLUMNS = ("goal", "skills", "arm", "solved", "steps", "replans", "not solved")
+
+
+@dataclass(frozen=True)
+class ArmChoice:
+    """How stiff an arm is.
+
+    Args:
+        impedance: Stiffness with which the hand is pulled, N/m; 0: that of joints counts.
+        stiffness: How many times as stiff as usual the joints are.
+        lag_s: Time by which a joint in motion is behind its command, s.
+    """
+
+    impedance: float = 0.0
+    stiffness: float = 1.0
+    lag_s: float = 0.07
+
+    @property
+    def control(self) -> ArmControl:
+        """The control of the arm.
+
+        Raises:
+            InvalidParameterError: A number is not above 0 that counts.
+        """
+        from slap_ros.robot.mujoco.impedance import arm_control  # needs an extra
+
+        return arm_control(self.impedance, self.stiffness, self.lag_s)
+
+    def as_json(self) -> dict[str, Any]:
+        """What counts of it."""
+        if self.impedance:
+            return {"stiffness": None, "impedance": self.impedance}
+        return {"stiffness": self.stiffness, "impedance": None}
 
 
 @dataclass(frozen=True)
@@ -73,17 +107,19 @@ class MeasuredLoop:
     Args:
         choice: Domain with the skills to plan with.
         goal: Name of the goal; empty for the task's own.
-        stiffness: How many times as stiff as usual the arm's joints are; None for no arm: the
-            contact world itself.
-        lag_s: Time by which a joint in motion is behind its command, s.
+        arm: How stiff the arm is; None for no arm: the contact world itself.
         approach: Way to plan: with shortcuts over the skills, or without.
     """
 
     choice: DomainChoice
     goal: str
-    stiffness: float | None
-    lag_s: float
+    arm: ArmChoice | None
     approach: Approach = PURE_PLANNING
+
+    @property
+    def arm_as_json(self) -> dict[str, Any]:
+        """The arm; nothing of one where there is none."""
+        return {"stiffness": None, "impedance": None} if self.arm is None else self.arm.as_json()
 
 
 def solve_in_loop(loop: MeasuredLoop, seed: int, index: int) -> Trial:
@@ -97,25 +133,26 @@ def solve_in_loop(loop: MeasuredLoop, seed: int, index: int) -> Trial:
     Returns:
         What came of it.
     """
-    domain = open_domain(replace(loop.choice, measured=loop.stiffness is not None))
+    arm = loop.arm
+    domain = open_domain(replace(loop.choice, measured=arm is not None))
     task = task_with_goal(domain, seed, index, loop.goal or None)
-    if loop.stiffness is None:
+    if arm is None:
         return Trial.of(seed, index, solve(domain, task, loop.approach))
-    from slap_ros.robot.mujoco.arm import ArmMotors  # needs an extra
-    from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld
+    from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld  # needs an extra
 
-    motors = ArmMotors(loop.stiffness, loop.lag_s)
     return solve_on_robot(
         domain,
         task,
         lambda domain, state: loop.approach.planner("lazy", domain, state),
-        lambda domain, state: ContactLoopWorld(domain, state, motors),
+        lambda domain, state: ContactLoopWorld(domain, state, arm.control),
     )
 
 
-def arm_in_words(stiffness: float | None) -> str:
-    """The arm by its stiffness, or what is in its place."""
-    return OWN if stiffness is None else f"× {stiffness:g}"
+def arm_in_words(row: Mapping[str, Any]) -> str:
+    """The arm by its stiffness, or what is in its place; earlier results have no impedance."""
+    if impedance := row.get("impedance"):
+        return f"{impedance:g} N/m"
+    return OWN if row["stiffness"] is None else f"× {row['stiffness']:g}"
 
 
 @dataclass(frozen=True)
@@ -135,7 +172,7 @@ class LoopRow:
     @property
     def arm(self) -> str:
         """The arm in words."""
-        return arm_in_words(self.loop.stiffness)
+        return arm_in_words(self.loop.arm_as_json)
 
     @property
     def figures(self) -> ReplannedTrials:
@@ -148,7 +185,7 @@ class LoopRow:
             "goal": self.loop.goal,
             "skills": self.skills,
             "library": self.loop.choice.digest,
-            "stiffness": self.loop.stiffness,
+            **self.loop.arm_as_json,
             **self.figures.as_json(),
             "failures": dict(failures(self.trials)),
             "trials": [trial.as_json() for trial in self.trials],
@@ -203,7 +240,7 @@ def _solved(
     loop: MeasuredLoop, skills: str, indices: Iterable[int], seed: int, runner: JobRunner
 ) -> LoopRow:
     """What comes of a goal's tasks with some skills and an arm."""
-    what = f"{loop.goal or loop.choice.name}, {skills}, {arm_in_words(loop.stiffness)}"
+    what = f"{loop.goal or loop.choice.name}, {skills}, {arm_in_words(loop.arm_as_json)}"
     jobs = {f"{what}: task {i}": (loop, seed, i) for i in indices}
     trials = runner.run(what, solve_in_loop, Trial.from_json, jobs, failure=not_solved)
     return LoopRow(loop, skills, tuple(trials.values()))
@@ -226,7 +263,7 @@ def _summary(found: Data) -> str:
     first = found["rows"][0]["goal"]
     words: dict[str, list[str]] = {}
     for row in (row for row in found["rows"] if row["goal"] == first):
-        arm = arm_in_words(row["stiffness"])
+        arm = arm_in_words(row)
         solved = sum(trial["success"] for trial in row["trials"])
         words.setdefault(row["skills"], []).append(f"{arm} {solved} of {len(row['trials'])}")
     return "; ".join(f"{skills}: {', '.join(arms)}" for skills, arms in words.items())
@@ -246,11 +283,17 @@ class ClosedLoopOptions:
         ),
     ] = None
     goal: GoalNames = None
-    stiffness: Annotated[
+    impedance: Annotated[
         list[float] | None,
         CommandOption(
-            "Stiffness of the arm's joints, as a factor. May be repeated. Default: 1, 4 and 10."
+            "Stiffness with which the hand is pulled, in N/m. May be repeated. Default: 3000, "
+            "without --stiffness.",
+            name="--impedance",
         ),
+    ] = None
+    stiffness: Annotated[
+        list[float] | None,
+        CommandOption("Stiffness of joints that are pulled instead, as a factor. May be repeated."),
     ] = None
     lag: Annotated[
         float, CommandOption("Time by which a joint in motion is behind its command, in s.")
@@ -286,6 +329,20 @@ def _ways_to_plan(
     return ways
 
 
+def _arms(options: ClosedLoopOptions) -> list[ArmChoice]:
+    """The arms that are asked for: impedances first.
+
+    Raises:
+        InvalidParameterError: There is no such arm.
+    """
+    impedances = options.impedance or ([] if options.stiffness else [3000.0])
+    arms = [ArmChoice(impedance=impedance) for impedance in impedances]
+    arms += [ArmChoice(0.0, factor, options.lag) for factor in options.stiffness or ()]
+    for arm in arms:
+        _ = arm.control
+    return arms
+
+
 def prepare(options: ClosedLoopOptions, tell: Tell) -> PreparedStudy:
     """Open the domain with each library and with its demonstrator; choose goals and arms.
 
@@ -294,29 +351,26 @@ def prepare(options: ClosedLoopOptions, tell: Tell) -> PreparedStudy:
             hand that acts by forces.
     """
     require_mujoco()
-    from slap_ros.robot.mujoco.arm import ArmMotors  # needs an extra
-
     domain = get_domain(options.domain, options.preset)
     if ROBOT not in domain.types:
         raise InvalidParameterError(
             f"{options.domain} has no hand that acts by forces; `slap study transfer "
             f"{options.domain}` is its closed loop"
         )
-    stiffness = options.stiffness or [1.0, 4.0, 10.0]
-    for factor in stiffness:
-        ArmMotors(factor, options.lag)
+    arms = _arms(options)
     loops = {
         skills: [
-            MeasuredLoop(choice, goal, factor, options.lag, approach)
+            MeasuredLoop(choice, goal, arm, approach)
             for goal in options.goal or all_goals(domain)
-            for factor in (None, *stiffness)
+            for arm in (None, *arms)
         ]
         for skills, (choice, approach) in _ways_to_plan(options, domain.preset, tell).items()
     }
     return PreparedStudy(
         {
             "preset": domain.preset,
-            "stiffness": stiffness,
+            "impedance": [arm.impedance for arm in arms if arm.impedance] or None,
+            "stiffness": [arm.stiffness for arm in arms if not arm.impedance] or None,
             "lag": options.lag,
             "tasks": options.tasks,
             "seed": options.seed,
