@@ -4,6 +4,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 pytest.importorskip("pybullet")
@@ -16,6 +17,7 @@ from slap_ros.worlds.contact.contacts import Side
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.hand import SUBSTEP_S
 from slap_ros.worlds.contact.hand_model import PANDA, QUICK, HandModel
+from slap_ros.worlds.contact.snapshot import ContactIndex
 
 BENCHES = [name for name in domain_names() if ROBOT in get_domain(name).types]
 
@@ -52,11 +54,9 @@ def test_a_pandas_hand_lags_and_its_fingers_are_slower():
     """Where nothing is near, a formula says where it is; PyBullet agrees elsewhere."""
     domain = get_domain("stack_at_target", "fair:hand=panda")
     with domain.make_world(domain.task(3).initial_state) as world:
-        from slap_ros.worlds.contact.snapshot import ContactIndex
-
         index = ContactIndex.of(world.scene, world.state.layout)
         for _ in range(12):
-            state = world.step([0.01, 0.0, 0.0, 0.0, 1.0])
+            state = world.step(np.array([0.01, 0.0, 0.0, 0.0, 1.0]))
         hand = index.read(state).hand
     lag_s = SUBSTEP_S / PANDA.share
     behind = hand.target[0] - hand.pose.position[0]
