@@ -22,7 +22,7 @@ from slap_ros.files import read_text
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.worlds.bullet import PANDA
-from slap_ros.worlds.panda import JOINTS
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, JOINTS
 
 PERIOD_S = 0.002  # of the physics and of the controllers
 ARM_JOINTS = tuple(f"panda_joint{i + 1}" for i in range(JOINTS))
@@ -145,8 +145,9 @@ def arm_spec(control: ArmControl = JOINT_POSITIONS) -> Any:
         joint.armature = FINGER_ARMATURE if finger else ARMATURE
         joint.damping = [0.0 if finger else JOINT_DAMPING, 0.0, 0.0]
         joint.actfrclimited = False  # the URDF's efforts: 20 N of each finger; motors have theirs
-    for name, usual, torque in zip(ARM_JOINTS, STIFFNESS, TORQUE, strict=True):
-        _add_motor(spec, name, control.motor(usual), torque)
+    for i, name in enumerate(ARM_JOINTS):
+        spec.joint(name).range = [JOINT_LOW[i], JOINT_HIGH[i]]  # the URDF's are wider
+        _add_motor(spec, name, control.motor(STIFFNESS[i]), TORQUE[i])
     for name in FINGER_JOINTS:
         _add_motor(spec, name, FINGER_MOTOR, FINGER_FORCE)
     _couple_fingers(spec)

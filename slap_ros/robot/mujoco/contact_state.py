@@ -11,6 +11,7 @@ from __future__ import annotations
 from slap_ros.relational import State
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.servoing import moving_hand
+from slap_ros.robot.state_assembly import possible_joints
 from slap_ros.worlds.contact.command import HandCommand
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.snapshot import ContactIndex, Opening, stopped_at_ends
@@ -28,13 +29,14 @@ def measured_state(
         command: What the hand was told last.
     """
     index, held = ContactIndex.of(scene, template.layout), plant.grasped()
+    joints = tuple(possible_joints(plant.joints))
     hand = moving_hand(
-        plant.joints, plant.joint_velocities, plant.fingers, plant.finger_velocities, command
+        joints, plant.joint_velocities, plant.fingers, plant.finger_velocities, command
     )
     motions, names = plant.motions(), [body.name for body in scene.free]
     openings = plant.openings()
     measured = index.read(template)._replace(
-        joints=tuple(plant.joints),
+        joints=joints,
         hand=hand,
         bodies=tuple(motions[name] for name in names),
         openings=tuple(

@@ -24,7 +24,7 @@ from slap_ros.worlds.contact.hand_model import PANDA
 from slap_ros.worlds.panda import JOINTS, GraspKinematics, grasp_pose
 
 STIFFNESS = 3000.0  # N/m, the most that Franka's own controller takes
-DAMPING = 2.4  # √kg: times √stiffness it is N s/m, nearly critical for what the hand weighs there
+DAMPING = 3.3  # √kg: times √stiffness it is N s/m, .7 of critical for the arm that moves along
 FORCE = PANDA.pull_n  # N, along each axis of the base at most
 MOMENT = 8.0  # Nm, about each axis of the base at most
 TURN_STIFFNESS, TURN_DAMPING = 300.0, 15.0  # Nm/rad and Nm s/rad, about each axis of the base

@@ -41,6 +41,6 @@ class HandModel:
 
 
 QUICK = HandModel()
-# A Panda's whose arm is an impedance of 3000 N/m: it lags by 40 ms, and its pads are less rough.
-PANDA = HandModel(share=0.07, finger_speed=0.05, friction=1.0)
+# A Panda's whose arm is an impedance of 3000 N/m: it lags by 50 ms, and its pads are less rough.
+PANDA = HandModel(share=0.05, finger_speed=0.05, friction=1.0)
 HANDS = {"quick": QUICK, "panda": PANDA}
