@@ -116,7 +116,16 @@ class ArmMotors:
         return MotorLaw(stiffness, stiffness, self.lag_s * stiffness)
 
     def commands(self, told: Numbers, joints: Numbers, velocities: Numbers) -> Numbers:  # noqa: ARG002
-        """The joint positions themselves."""
+        """The joint positions to go to, since the motors pull there.
+
+        Args:
+            told: Joint positions to go to, rad, shape (7,).
+            joints: Joint positions, rad, shape (7,).
+            velocities: Joint velocities, rad/s, shape (7,).
+
+        Returns:
+            The first of them.
+        """
         return told
 
     def replacing(self, points: Sequence[TrajectoryPoint]) -> Sequence[TrajectoryPoint]:

@@ -69,6 +69,9 @@ class HandImpedance:
             told: Joint positions to go to, rad, shape (7,).
             joints: Joint positions, rad, shape (7,).
             velocities: Joint velocities, rad/s, shape (7,).
+
+        Returns:
+            None of them beyond a Panda's.
         """
         now, goal, rates = GraspKinematics(joints), grasp_pose(told), np.asarray(velocities)
         jacobian = now.jacobian()
