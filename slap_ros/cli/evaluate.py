@@ -21,7 +21,7 @@ from slap_ros.api.evaluation import (
 )
 from slap_ros.api.library_descriptions import both_in_words, describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.cli.options import EffortFactor, Goal, Json, NoImprove, Planner, Within, at_most
 from slap_ros.cli.rivals import Against, RivalResults, run_rivals
 from slap_ros.cli.shortcuts import choose
@@ -136,7 +136,7 @@ def _show(
         made = {"approaches": rows, "versions": versions()}
         print_json(summaries[-1].as_json() | made)
     else:
-        console.print(_table(experiment, compared))
+        print_result(_table(experiment, compared))
     solved = all(summary.success_rate == 1.0 for summary in summaries)
     return rivals.exit_code if solved else int(ErrorCode.UNKNOWN)
 
