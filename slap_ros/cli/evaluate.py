@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
 
 from slap_ros.api.command_line import command_line
 from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples, ShortcutFolder
@@ -167,7 +167,7 @@ def _complaint(approach: Approach, trial: Trial) -> str:
 
 def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
     table = Table(
-        "approach",
+        Column("approach", overflow="fold"),  # two names may differ in their last letters
         "success [95 %]",
         "plan length [steps]",
         "relative length [95 %]",
