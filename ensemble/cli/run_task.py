@@ -324,8 +324,8 @@ def _event_view(live: bool) -> AbstractContextManager[OnMessage]:
 
 
 def _conclude(metrics: RunMetrics, record: Path | None, json: bool) -> None:
-    tell = console.print if json else print_result  # what the JSON has too
     if metrics.success:
+        tell = console.print if json else print_result  # the JSON has it too
         tell(
             styled(
                 "solved",
@@ -341,6 +341,6 @@ def _conclude(metrics: RunMetrics, record: Path | None, json: bool) -> None:
             console.print(styled("error", "bold red", f" {metrics.error_msg}"))
     else:
         verdict = "not known whether solved" if metrics.success is None else "not solved"
-        tell(styled(verdict, "bold red", f": {metrics.error_msg}"))
+        console.print(styled(verdict, "bold red", f": {metrics.error_msg}"))
     if record is not None:
         console.print(f"bag: {record}")

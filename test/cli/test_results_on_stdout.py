@@ -63,3 +63,20 @@ def test_letters_that_stdout_lacks_are_written_out() -> None:
     ran = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=100)
     assert ran.returncode == 0, ran.stderr
     assert "pure_planning" in ran.stdout and r"\xb1" in ran.stdout
+
+
+def test_a_run_that_solved_its_task_says_so_on_stdout(network: int) -> None:
+    command = [sys.executable, "-m", "ensemble.cli", "run", "obstacle2d", "--seed", "3"]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.startswith("solved in ") and ran.stdout.count("\n") == 1
+    assert "plan 0: " in ran.stderr and "solved in" not in ran.stderr
+
+
+def test_a_run_that_failed_says_so_on_stderr_alone(network: int) -> None:
+    command = [sys.executable, "-m", "ensemble.cli", "run", "obstacle2d", "--seed", "3"]
+    command += ["--timeout", "0.1"]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    assert ran.returncode != 0
+    last = ran.stderr.splitlines()[-1]
+    assert ran.stdout == "" and last.startswith(("error ", "not solved: ")), ran.stderr
