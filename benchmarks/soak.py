@@ -83,9 +83,9 @@ These are its causes, with CPython 3.11, CycloneDDS 11.0.1 and glibc:
   4 MiB at most in all. `tuple(generator)` adds one each time. A full garbage collection, which is
   rare, gives them back. Python's memory of `perception_node` grew by 32 blocks per task without
   one, and not at all with one every five seconds.
-- **The recorder's index** has an entry for every message in the current 64 KiB of its bag, and one
-  for each 64 KiB before, because a closed bag ends with an index. It grows by about a tenth of a
-  KiB per task, as long as the recorder runs.
+- **The recorder's index** has an entry for every message in the current chunk of its bag, and one
+  for each chunk before, because a closed bag ends with an index. With chunks of 64 KiB, as then,
+  it grows by about a tenth of a KiB per task, as long as the recorder runs.
 
 `slap_run` is the process that asks for the tasks. It does not leak either: with a full garbage
 collection and `malloc_trim` after every 40 tasks it had 69.6 MiB after 40 and after 160 tasks, of

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from ensemble.network import start_node
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.redaction import without_secrets
-from slap_ros.signals import forget_interrupt, interrupts_in_destructors
+from slap_ros.signals import forget_interrupt, interrupts_ignored, interrupts_in_destructors
 
 
 def run_node(name: str, make: Callable[[], Node]) -> int:
@@ -61,7 +61,8 @@ def _spin(make: Callable[[], Node]) -> None:
         if rclpy.ok():  # not stopped while the node was made: rclpy's executor would print an error
             rclpy.spin(node)
     finally:
-        node.destroy_node()
+        with interrupts_ignored():
+            node.destroy_node()
 
 
 def _refuse(name: str, error: Exception, code: ErrorCode) -> int:

@@ -130,6 +130,22 @@ def signals_held_back() -> Iterator[None]:
             signal.raise_signal(arrived[0])
 
 
+@contextmanager
+def interrupts_ignored() -> Iterator[None]:
+    """Ignore SIGINT in between, for what has to end: a file that is closed, an arm brought to rest.
+
+    Ctrl-C is pressed twice, or arrives from the terminal and from a parent that passes it on.
+    """
+    if threading.current_thread() is not threading.main_thread():  # no other is ever interrupted
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
 def _ignore_from_now_on() -> None:
     for number in WORDS:
         if signal.getsignal(number) is _exit_at_once:

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.table import Table
@@ -19,7 +20,7 @@ from ensemble.robot_parameters import GIVEN_WITH_THE_RUN, FrankaBridgeParameters
 from slap_ros.api.execution import execute
 from slap_ros.api.planning import plan_task
 from slap_ros.api.shortcut_choice import shortcuts_of_option
-from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.console import console, print_json, print_result, warn
 from slap_ros.core import Domain, Task
 from slap_ros.errors import ErrorCode, TaskCanceledError
 from slap_ros.robot.blended_run import BlendedRun
@@ -28,6 +29,9 @@ from slap_ros.robot.franka.limits import JERK, franka_limits
 from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.limits import Limits
 from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 
 def require_yes(agreed: bool) -> None:
@@ -92,8 +96,28 @@ def blended_run(recorded: RecordedMotion, limits: Limits, speed: float) -> Blend
     return BlendedRun.without_stops(recorded, limits, tuple(speed * jerk for jerk in JERK))
 
 
+def tell_check(
+    recorded: RecordedMotion, checked: DryRun, arm: str, tell: Callable[[RenderableType], None]
+) -> None:
+    """Tell a dry run to people.
+
+    Args:
+        recorded: Motion that was checked.
+        checked: Dry run of the motion.
+        arm: Name of the arm.
+        tell: Prints a table or a sentence.
+    """
+    tell(_table(recorded, checked, arm))
+    _tell_violations(checked, tell)
+
+
+def _tell_violations(checked: DryRun, tell: Callable[[RenderableType], None]) -> None:
+    for step, reason in checked.violations:
+        tell(f"step {step}: {reason}")
+
+
 def show_check(recorded: RecordedMotion, checked: DryRun, arm: str, as_json: bool) -> int:
-    """Print a dry run; the exit code of a command that does no more.
+    """Print a dry run as the result; the exit code of a command that does no more.
 
     Args:
         recorded: Motion that was checked.
@@ -106,10 +130,9 @@ def show_check(recorded: RecordedMotion, checked: DryRun, arm: str, as_json: boo
     """
     if as_json:
         print_json(as_data(recorded, checked))
+        _tell_violations(checked, console.print)
     else:
-        console.print(_table(recorded, checked, arm))
-    for step, reason in checked.violations:
-        console.print(f"step {step}: {reason}")
+        tell_check(recorded, checked, arm, print_result)
     return int(ErrorCode.UNSAFE_COMMAND) if checked.violations else 0
 
 

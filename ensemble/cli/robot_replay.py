@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from ensemble import replay as ensemble_replay
-from ensemble.cli.motion_check import as_data, blended_run, require_yes, show_check
+from ensemble.cli.motion_check import as_data, blended_run, require_yes, show_check, tell_check
 from ensemble.cli.replay_options import ReplayOptions
 from ensemble.nodes import SLOW_CLOCK
 from ensemble.parameters import parse_parameters
@@ -20,7 +20,7 @@ from ensemble.robot_parameters import (
     parse_mock_robot,
 )
 from slap_ros.cli.bars import counting_bars
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.franka.installed import require_franky, simulator_python
@@ -46,9 +46,9 @@ def replay_on_robot(options: ReplayOptions) -> int:
     parameters = _parameters(options)
     recorded = read_recorded_motion(options.bag, options.namespace)
     checked = _checked(recorded, parameters)
-    code = show_check(recorded, checked, parameters.arm, options.json and options.dry_run)
     if options.dry_run:
-        return code
+        return show_check(recorded, checked, parameters.arm, options.json)
+    tell_check(recorded, checked, parameters.arm, console.print)
     checked.require_safe()
     driver = _driver(options, parameters)
     require_yes(options.yes or options.to in (MOCK, FRANKA_SIM))
@@ -109,5 +109,6 @@ def _execute(
     reached = played.reached(recorded)
     if options.json:
         print_json(as_data(recorded, checked) | {"played": played.steps, "reached": reached})
-    console.print(f"{played.steps} steps executed; {REACHED[reached]}")
+    tell = console.print if options.json else print_result
+    tell(f"{played.steps} steps executed; {REACHED[reached]}")
     return int(ErrorCode.REPLAY_MISMATCH) if reached is False else 0

@@ -35,7 +35,7 @@ from ensemble.run import run as run_ensemble
 from ensemble.shortcuts import GROWN
 from ensemble.skill_request import SkillRequest
 from slap_ros.api.video import require_renderable
-from slap_ros.cli.console import console, print_json, styled
+from slap_ros.cli.console import console, print_json, print_result, styled
 from slap_ros.cli.options import say_default_seed
 from slap_ros.cli.render import picture_size
 from slap_ros.cli.render import render as write_animation
@@ -92,7 +92,7 @@ def run_task(options: RunOptions) -> int:
             print_json(metrics.as_json())
         # Another run has taken the name meanwhile: the bag there is that one's.
         has_bag = metrics.error_code != ErrorCode.BAG_EXISTS
-        _conclude(metrics, options.record if has_bag else None)
+        _conclude(metrics, options.record if has_bag else None, options.json)
         code = 0
         if bag is not None and has_bag and options.report is not None:
             from slap_ros.cli.report import write_report
@@ -323,9 +323,10 @@ def _event_view(live: bool) -> AbstractContextManager[OnMessage]:
     return nullcontext(EventPrinter())
 
 
-def _conclude(metrics: RunMetrics, record: Path | None) -> None:
+def _conclude(metrics: RunMetrics, record: Path | None, json: bool) -> None:
     if metrics.success:
-        console.print(
+        tell = console.print if json else print_result  # the JSON has it too
+        tell(
             styled(
                 "solved",
                 "bold green",

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reading MCAP files from beginning to end, up to the first damage.
 
-The index at a file's end is not used: a file whose writer was killed has none.
+The index at a file's end is not used: a file whose writer was killed has none. A chunk in which one
+bit was flipped is read as it was written, and reported when there is nothing more to read.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import BinaryIO
 import lz4.frame  # type: ignore[import-untyped]
 from backports import zstd
 
+from slap_ros.bags.bit_correction import flipped_bit, with_flipped_bit
 from slap_ros.bags.compression import SUFFIX, open_data
 from slap_ros.bags.compression import UNREADABLE as UNPACKABLE
 from slap_ros.bags.mcap_records import (
@@ -37,6 +39,7 @@ from slap_ros.errors import DamagedBagError
 from slap_ros.files import open_regular
 
 UNREADABLE = (MalformedRecordError, UnicodeDecodeError, OSError)
+MOST_CORRECTIONS = 100  # of chunks in a file; each takes some ten milliseconds
 IGNORED = (Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)  # outside of chunks
 
 
@@ -60,7 +63,8 @@ def read_mcap(
         budget: Budget of the bag for its chunks; None for that of a bag of this file alone.
 
     Raises:
-        DamagedBagError: After the last message that precedes the damage.
+        DamagedBagError: After the last message that precedes the damage; after the last one of all
+            where every damage was corrected.
     """
     try:
         with open_regular(path) as file:
@@ -93,8 +97,20 @@ class _McapScan:
         self._channels: dict[int, Channel] = {}
         self._count = 0  # messages so far
         self._numbered = False  # whether the file's messages are numbered throughout
+        self._corrected: list[int] = []  # offsets of chunks in which a bit was flipped
 
     def messages(self) -> Iterator[RawMessage]:
+        complaints = []
+        try:
+            yield from self._stored()
+        except (MalformedRecordError, UnicodeDecodeError) as error:
+            complaints.append(str(error))
+        complaints.extend(self._corrections())
+        if complaints:
+            raise MalformedRecordError("; ".join(complaints))
+
+    def _stored(self) -> Iterator[RawMessage]:
+        """The messages up to the first damage that cannot be corrected."""
         self._check_magic("is not an MCAP file" if self._size else "is empty")
         while True:
             start = self._position
@@ -110,7 +126,7 @@ class _McapScan:
                 if opcode == Opcode.DATA_END:
                     return self._check_ending(content)
                 if opcode == Opcode.CHUNK:
-                    yield from self._records(self._chunk(content))
+                    yield from self._records(self._chunk(start, content))
                 else:
                     yield from self._top_level(opcode, content)
             except (MalformedRecordError, UnicodeDecodeError) as error:
@@ -173,8 +189,8 @@ class _McapScan:
         elif opcode not in IGNORED and opcode < FIRST_PRIVATE_OPCODE:
             yield from self._record(opcode, memoryview(content))
 
-    def _chunk(self, content: bytes) -> memoryview:
-        """The records of a complete chunk, checked and uncompressed."""
+    def _chunk(self, start: int, content: bytes) -> memoryview:
+        """The records of a complete chunk at an offset of the file, checked and uncompressed."""
         fields = RecordFields(content)
         _, _, size, crc = CHUNK.unpack(fields.take(CHUNK.size))
         compression = fields.string()
@@ -188,8 +204,24 @@ class _McapScan:
         if len(data) != size:
             raise MalformedRecordError(f"a chunk of {size} bytes has {len(data)}")
         if crc and zlib.crc32(data) != crc:
-            raise MalformedRecordError("a chunk's checksum is wrong")
+            # A flipped bit in compressed data is many in what it unpacks to.
+            place = None if compression else flipped_bit(data, crc)
+            if place is None or len(self._corrected) >= MOST_CORRECTIONS:
+                raise MalformedRecordError("a chunk's checksum is wrong")
+            self._corrected.append(start)
+            return with_flipped_bit(data, place)
         return data
+
+    def _corrections(self) -> Iterator[str]:
+        """What was corrected, in words; none where nothing was."""
+        match self._corrected:
+            case [start]:
+                yield f"has a flipped bit in the chunk at byte {start}, which was corrected"
+            case [start, *more]:
+                yield (
+                    f"has a flipped bit in each of {1 + len(more)} chunks, the first at byte "
+                    f"{start}, which were corrected"
+                )
 
     def _truncated_chunk(self, content: bytes) -> Iterator[RawMessage]:
         """What can be read of a chunk that the file breaks off in."""

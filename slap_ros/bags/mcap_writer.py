@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import slap_ros
+from slap_ros.bags.bit_correction import CORRECTABLE_BYTES
 from slap_ros.bags.mcap_records import (
     CHUNK,
     FOOTER,
@@ -42,7 +43,7 @@ from slap_ros.bags.mcap_records import (
 )
 from slap_ros.bags.rosbag2 import Extent, TopicRecord
 
-CHUNK_SIZE = 64 * 1024  # bytes: what one damaged byte may cost
+CHUNK_SIZE = CORRECTABLE_BYTES  # at most, but for a longer message: a flipped bit costs nothing
 
 
 @dataclass
@@ -113,7 +114,6 @@ class McapWriter:
         Raises:
             OSError: There is no room; nothing was written.
         """
-        chunk = self._chunk_with_room()
         if topic.type_name not in self._schemas:
             schema = record(
                 Opcode.SCHEMA,
@@ -122,7 +122,7 @@ class McapWriter:
                 string("ros2msg"),
                 string(definition),
             )
-            self._append_to_chunk(chunk, schema)
+            self._append_to_chunk(schema)
             self._schemas[topic.type_name] = schema
         number = len(self._channels) + 1
         channel = record(
@@ -135,7 +135,7 @@ class McapWriter:
                 {"offered_qos_profiles": topic.qos_yaml, "topic_type_hash": topic.type_hash}
             ),
         )
-        self._append_to_chunk(chunk, channel)
+        self._append_to_chunk(channel)
         self._channels.append(channel)
         self.topics.append(topic)
         return number
@@ -151,14 +151,12 @@ class McapWriter:
         Raises:
             OSError: There is no room; nothing was written.
         """
-        chunk = self._chunk_with_room()
-        offset = self._size - chunk.data_start
         # Messages are numbered through the whole bag, so that a reader sees where some are lost.
         sequence = self.extent.message_count & SEQUENCE_MASK
         head = MESSAGE_RECORD.pack(
             Opcode.MESSAGE, MESSAGE.size + len(data), channel, sequence, stamp_ns, stamp_ns
         )
-        self._append_to_chunk(chunk, head + data)
+        chunk, offset = self._append_to_chunk(head + data)
         chunk.index.setdefault(channel, bytearray()).extend(INDEX_ENTRY.pack(stamp_ns, offset))
         chunk.extent.include(stamp_ns)
         self.extent.include(stamp_ns)
@@ -196,9 +194,13 @@ class McapWriter:
         self._file.seek(size)
         self._size = size
 
-    def _append_to_chunk(self, chunk: _Chunk, data: bytes) -> None:
+    def _append_to_chunk(self, data: bytes) -> tuple[_Chunk, int]:
+        """Append a record to the current chunk or to a new one, where it has the given offset."""
+        chunk = self._chunk_with_room(len(data))
+        offset = self._size - chunk.data_start
         self._append(data)
         chunk.crc = zlib.crc32(data, chunk.crc)
+        return chunk, offset
 
     def _append_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         start = self._size
@@ -206,9 +208,13 @@ class McapWriter:
         where = U64.pack(start) + U64.pack(self._size - start)
         self._metadata_index.append(record(Opcode.METADATA_INDEX, where, string(name)))
 
-    def _chunk_with_room(self) -> _Chunk:
-        """The current chunk, or a new one where that is full."""
-        if self._chunk is not None and self._size - self._chunk.start >= CHUNK_SIZE:
+    def _chunk_with_room(self, size: int) -> _Chunk:
+        """The current chunk, or a new one where that would become too long.
+
+        A chunk with no message takes one of any length: what it has would otherwise be in none.
+        """
+        chunk = self._chunk
+        if chunk and chunk.index and self._size + size - chunk.data_start > CHUNK_SIZE:
             self._finish_chunk()
         if self._chunk is None:
             chunk = _Chunk(self._size)

@@ -117,7 +117,9 @@ def _made(source: str) -> PredictingPolicy:
     try:
         policy = getattr(import_module(module), name)()
     except Exception as error:  # code of others may raise anything
-        raise InvalidLibraryError(f"{source}: cannot be made: {error!r}") from error
+        raise InvalidLibraryError(
+            f"{source}: cannot be made: {type(error).__name__}: {error}"
+        ) from error
     if not callable(getattr(policy, "predict", None)):
         raise InvalidLibraryError(f"{source}: {type(policy).__name__} has no predict(observation)")
     made: PredictingPolicy = policy

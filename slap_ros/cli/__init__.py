@@ -123,7 +123,7 @@ def command_app(commands: Sequence[CommandEntry]) -> typer.Typer:
         "runs.",
         epilog=(
             "Exit codes: 0 done, 2 wrong usage, 130 interrupted, 143 terminated; any other is an "
-            "error code of slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."
+            "error code of slap_msgs/ErrorCode. Results go to stdout, as JSON alone with --json."
         ),
         no_args_is_help=True,
         pretty_exceptions_enable=False,

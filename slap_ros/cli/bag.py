@@ -26,7 +26,7 @@ from slap_ros.bags import (
 from slap_ros.bags.ensembles import ROOT
 from slap_ros.bags.export import choose_format, export_episodes, require_exportable
 from slap_ros.bags.recording import Recording
-from slap_ros.cli.console import console, exits, print_json, styled
+from slap_ros.cli.console import console, exits, print_json, print_result, styled
 from slap_ros.cli.options import Json
 from slap_ros.cli.render import Size, picture_size
 from slap_ros.cli.render import render as write_animation
@@ -67,11 +67,11 @@ def info(bag: BagPath, json: Json = False) -> int:
         table = Table("topic", "type", "messages", title=f"{bag}, {found.duration_s:.2f} s")
         for topic in found.topics:
             table.add_row(topic.name, topic.type_name, str(topic.message_count))
-        console.print(table)
+        print_result(table)
         if len(found.ensembles) > 1:
-            console.print(f"ensembles: {', '.join(found.ensembles)}")
+            print_result(f"ensembles: {', '.join(found.ensembles)}")
         for key, value in found.metadata.items():
-            console.print(f"{key}: {value}")
+            print_result(f"{key}: {value}")
     return _warn(found.damage)
 
 
@@ -80,8 +80,9 @@ def info(bag: BagPath, json: Json = False) -> int:
 def evaluate(bag: BagPath, namespace: Namespace = None, json: Json = False) -> int:
     """Compute every number of a run again, and the atoms of every state."""
     found = evaluate_bag(bag, namespace)
+    tell = console.print if json else print_result  # what is in the JSON only as a number
     for mismatch in found.mismatches:
-        console.print(
+        tell(
             f"{_prefix(mismatch.namespace)}episode {mismatch.episode}, step {mismatch.step}: "
             f"missing {list(mismatch.missing)}, extra {list(mismatch.extra)}",
         )
@@ -91,13 +92,13 @@ def evaluate(bag: BagPath, namespace: Namespace = None, json: Json = False) -> i
         print_json(runs[0] if len(runs) == 1 else runs)
     else:
         for name, run in named:
-            console.print(_table(name, run))
-        console.print(
+            print_result(_table(name, run))
+        print_result(
             f"{found.compared} of {found.states} states perceived again, "
             f"{len(found.mismatches)} mismatches"
         )
     if not found.runs:
-        console.print("no run: nothing was planned, or neither plans nor their events recorded")
+        tell("no run: nothing was planned, or neither plans nor their events recorded")
     if found.left_out:
         topics = ", ".join(found.left_out)
         console.print(f"left out, as there are others of their types: {topics}")
@@ -205,12 +206,12 @@ def replay_in_world(bag: Path, namespace: str | None, json: bool) -> int:
     if json:
         print_json(asdict(result) | {"identical": result.identical})
     else:
-        console.print(f"{result.compared} states compared, {result.different} differ")
+        print_result(f"{result.compared} states compared, {result.different} differ")
         if result.unreached:
-            console.print(f"{result.unreached} states without the commands that lead to them")
+            print_result(f"{result.unreached} states without the commands that lead to them")
         if result.first is not None:
             first = result.first
-            console.print(
+            print_result(
                 f"first: {_prefix(first.namespace)}episode {first.episode}, step {first.step}, "
                 f"{first.object}.{first.feature}: recorded {first.recorded!r}, "
                 f"replayed {first.replayed!r}",

@@ -16,7 +16,7 @@ from rich.table import Table
 from slap_ros.api.command_options import DomainName, Preset
 from slap_ros.baselines.method import BaselineProgress
 from slap_ros.baselines.methods import METHODS
-from slap_ros.cli.console import console, exits, print_json
+from slap_ros.cli.console import console, exits, print_json, print_result
 from slap_ros.cli.learning_bars import LearningBars
 from slap_ros.cli.options import Goal, Json, flat_options
 from slap_ros.cli.skill_choice import open_chosen
@@ -127,7 +127,7 @@ def list_methods(json: Json = False) -> int:
     table = Table("method", "")
     for name, entry in METHODS.items():
         table.add_row(name, entry.help)
-    console.print(table)
+    print_result(table)
     return 0
 
 

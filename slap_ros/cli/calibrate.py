@@ -13,7 +13,7 @@ import typer
 from slap_ros.calibration.friction import IdentifiedFriction, identify_friction
 from slap_ros.calibration.pushes import read_pushes
 from slap_ros.calibration.settings import calibrated_preset, parameter_file
-from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.console import console, print_json, print_result, warn
 from slap_ros.cli.options import Json
 from slap_ros.files import require_writable, write_whole
 
@@ -47,8 +47,8 @@ def calibrate(
     if json:
         print_json({"domain": recorded.domain.name, "preset": preset, **asdict(found)})
         return
-    console.print(_text(found))
-    console.print(f"use it: slap run {recorded.domain.name} --preset {preset}")
+    print_result(_text(found))
+    print_result(f"use it: slap run {recorded.domain.name} --preset {preset}")
     if output is not None:
         console.print(f"parameter file: {output}")
 

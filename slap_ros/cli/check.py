@@ -12,7 +12,7 @@ import typer
 
 from slap_ros.api.command_options import DomainName, Preset
 from slap_ros.cli.check_shortcuts import check_library
-from slap_ros.cli.console import console, print_json, styled
+from slap_ros.cli.console import console, print_json, print_result, styled
 from slap_ros.cli.doctor import STYLE
 from slap_ros.cli.options import Json, Seed, at_most
 from slap_ros.cli.skill_choice import Skills
@@ -76,10 +76,12 @@ def _check_contract(
             findings.append(found)
             status.update(f"checking {domain}: {found.name} done")
             if not json:
+                status.stop()  # both streams may be the same terminal
                 label = f"{found.status:8} "
-                console.print(styled(label, STYLE[found.status], f"{found.name}: {found.found}"))
+                print_result(styled(label, STYLE[found.status], f"{found.name}: {found.found}"))
                 if found.advice:
-                    console.print(f"         {found.advice}")
+                    print_result(f"         {found.advice}")
+                status.start()
     if json:
         print_json([asdict(found) for found in findings])
     problem = any(found.status == "problem" for found in findings)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from slap_ros.api.shortcut_check import ShortcutCheck, check_shortcuts
-from slap_ros.cli.console import console, print_json, styled, warn
+from slap_ros.cli.console import console, print_json, print_result, styled, warn
 from slap_ros.cli.doctor import STYLE
 from slap_ros.cli.skill_choice import open_chosen
 from slap_ros.domains import get_domain
@@ -61,14 +61,14 @@ def _show(found: ShortcutCheck, library: Path) -> None:
     for trials in found.trials:
         verdict = "ok" if trials.holds else "problem"
         reached = f"reached its target from {trials.reached} of {trials.states} states"
-        console.print(styled(f"{verdict:8} ", STYLE[verdict], f"{trials.name}: {reached}"))
+        print_result(styled(f"{verdict:8} ", STYLE[verdict], f"{trials.name}: {reached}"))
     if found.unplanned:
-        console.print(f"{found.unplanned} of {found.tasks} tasks have no plan")
+        print_result(f"{found.unplanned} of {found.tasks} tasks have no plan")
     if not found.holds:
-        console.print(
+        print_result(
             f"{library} does not hold over {found.skills_in_words}. Train again over these with "
             "`slap train`; a shortcut that was tried in no state needs more --tasks"
         )
         return
     recorded = "" if found.over_own_skills else ". This is recorded in the library"
-    console.print(f"{library} holds over {found.skills_in_words}{recorded}")
+    print_result(f"{library} holds over {found.skills_in_words}{recorded}")

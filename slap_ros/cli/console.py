@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where words for people go: stderr. Where data goes: stdout. How every command ends.
+"""Where results go: stdout. Where everything else that is said goes: stderr. How a command ends.
+
+The result is what a command was asked for: a plan, a table, figures, findings. What it says on the
+way, warnings, and the names of files that it wrote are not.
 
 Texts from bags, files and command lines are data: nothing in them is taken for markup, and
 whatever would control the terminal is shown instead of sent.
@@ -204,9 +207,17 @@ def warn(text: str) -> None:
     console.print(styled("warning", "yellow", f" {text}"))
 
 
-def print_line(line: str) -> None:
-    """Print a line of data on stdout, such as a step of a plan."""
-    _stdout.write_line(visible(line))
+def print_result(what: RenderableType) -> None:
+    """Print a part of the result on stdout: a sentence, a table, or whatever else rich prints."""
+    if isinstance(what, str):
+        _stdout.write_line(visible(what))
+        return
+    from slap_ros.cli.plain_console import PlainConsole
+
+    on_stdout = PlainConsole(_stdout.stream)
+    with on_stdout.capture() as printed:
+        on_stdout.print(what)
+    _stdout.write_line(printed.get().rstrip("\n"))
 
 
 def print_json(data: Any) -> None:

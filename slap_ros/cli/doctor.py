@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from slap_ros.cli.console import console, print_json, styled
+from slap_ros.cli.console import console, print_json, print_result, styled
 from slap_ros.cli.options import Json
 from slap_ros.doctor.diagnosis import diagnose
 from slap_ros.doctor.franka import examine_robot, robot_address
@@ -41,6 +41,6 @@ def doctor(
         for check in checks:
             status = styled(check.status, STYLE[check.status])
             table.add_row(check.name, status, check.found, check.advice)
-        console.print(table)
+        print_result(table)
     problem = any(check.status == "problem" for check in checks)
     return int(ErrorCode.UNKNOWN) if problem else 0

@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from slap_ros.api.command_options import Preset, matching_domains
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.cli.options import Json
 from slap_ros.core import Domain
 from slap_ros.domains import domain_names, preset_names
@@ -58,7 +58,7 @@ def domains(
             ", ".join(one.goals),
             _settings(one),
         )
-    console.print(table)
+    print_result(table)
 
 
 def _available() -> Iterator[Domain]:
@@ -176,9 +176,9 @@ def _texts(atoms: Iterable[object]) -> list[str]:
 
 def _show(domain: Domain) -> None:
     """One domain in detail."""
-    console.print(f"{domain.name}, preset {domain.preset}")
+    print_result(f"{domain.name}, preset {domain.preset}")
     if domain.configuration:
-        console.print(f"  {_settings(domain)}")
+        print_result(f"  {_settings(domain)}")
     _list("goals, in the first task that has their objects", _goals(domain).items())
     _list("predicates", ((_signature(p), _meaning(domain, p)) for p in domain.predicates))
     _list("metrics", ((m.signature, _measure(m)) for m in _metrics(domain)))
@@ -202,11 +202,11 @@ def _by_hand_title(domain: Domain) -> str:
 def _list(title: str, entries: Iterable[tuple[str, str]]) -> None:
     """A heading, and an entry with what there is to say of it in each paragraph."""
     listed = list(entries)
-    console.print(f"\n{title}{'' if listed else ': none'}")
+    print_result(f"\n{title}{'' if listed else ': none'}")
     for name, text in listed:
-        console.print(f"  {name}")
+        print_result(f"  {name}")
         for line in filter(None, text.split("\n")):
-            console.print(f"      {line}")
+            print_result(f"      {line}")
 
 
 def _signature(predicate: Predicate) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
 
 from slap_ros.api.command_line import command_line
 from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples, ShortcutFolder
@@ -21,7 +21,7 @@ from slap_ros.api.evaluation import (
 )
 from slap_ros.api.library_descriptions import both_in_words, describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.cli.options import EffortFactor, Goal, Json, NoImprove, Planner, Within, at_most
 from slap_ros.cli.rivals import Against, RivalResults, run_rivals
 from slap_ros.cli.shortcuts import choose
@@ -136,7 +136,7 @@ def _show(
         made = {"approaches": rows, "versions": versions()}
         print_json(summaries[-1].as_json() | made)
     else:
-        console.print(_table(experiment, compared))
+        print_result(_table(experiment, compared))
     solved = all(summary.success_rate == 1.0 for summary in summaries)
     return rivals.exit_code if solved else int(ErrorCode.UNKNOWN)
 
@@ -167,7 +167,7 @@ def _complaint(approach: Approach, trial: Trial) -> str:
 
 def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
     table = Table(
-        "approach",
+        Column("approach", overflow="fold"),  # two names may differ in their last letters
         "success [95 %]",
         "plan length [steps]",
         "relative length [95 %]",

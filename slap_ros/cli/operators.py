@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from slap_ros.cli.console import console
+from slap_ros.cli.console import print_result
 from slap_ros.relational import LiftedOperator, RewardTemplate
 
 
@@ -13,13 +13,13 @@ def print_operator(operator: LiftedOperator, reward: RewardTemplate | None) -> N
 
     ``--operators`` reads what this prints.
     """
-    console.print(operator.signature)
+    print_result(operator.signature)
     different = [f"{one} != {other}" for one, other in operator.inequalities]
     for label, atoms, more in (
         ("PRE", operator.preconditions, different),
         ("EFF-", operator.delete_effects, []),
         ("EFF+", operator.add_effects, []),
     ):
-        console.print(f"  {label:5}{', '.join([*sorted(map(str, atoms)), *more]) or '-'}")
+        print_result(f"  {label:5}{', '.join([*sorted(map(str, atoms)), *more]) or '-'}")
     if reward is not None:
-        console.print(f"  {'R':5}{' + '.join(map(str, reward.terms))}")
+        print_result(f"  {'R':5}{' + '.join(map(str, reward.terms))}")

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, TextIO
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
@@ -14,17 +14,29 @@ from rich.text import Text
 
 from slap_ros.cli.console import visible
 
-FILE_WIDTH = 120  # columns, where stderr is no terminal: tables must not be cut there
+FILE_WIDTH = 120  # columns of what is no terminal: tables must not be cut there
 
 
 class PlainConsole(Console):
     """A console on which texts are data; style comes from :func:`styled` alone."""
 
-    def __init__(self) -> None:
-        at_a_terminal = sys.stderr is not None and sys.stderr.isatty()
+    def __init__(self, stream: TextIO | None = None) -> None:
+        """Print on a stream.
+
+        Args:
+            stream: Where to print; None for whatever stderr is at the time.
+        """
+        target = stream or sys.stderr
+        at_a_terminal = target is not None and target.isatty()
         width = None if at_a_terminal else FILE_WIDTH
         super().__init__(
-            stderr=True, soft_wrap=True, width=width, markup=False, highlight=False, emoji=False
+            file=stream,
+            stderr=stream is None,
+            soft_wrap=True,
+            width=width,
+            markup=False,
+            highlight=False,
+            emoji=False,
         )
 
     def render_str(self, text: str, **options: Any) -> Text:

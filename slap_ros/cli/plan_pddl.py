@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from slap_ros.cli.console import console, print_json, print_line
+from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.files import read_bytes
 from slap_ros.planning.greedy import find_plan
@@ -81,7 +81,7 @@ def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, 
         print_json({"plan": list(found.steps)} | costs)
         return
     for step in found.steps:
-        print_line(step)
+        print_result(step)
     console.print(str(found))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from slap_ros.api.planning import plan_task as make_plan
 from slap_ros.api.shortcut_choice import shortcuts_of_option
-from slap_ros.cli.console import console, print_json, print_line, warn
+from slap_ros.cli.console import console, print_json, print_result, warn
 from slap_ros.cli.outputs import write_files
 from slap_ros.core import Domain, Task
 from slap_ros.drawing import draw_abstract_graph
@@ -95,7 +95,7 @@ def _plan_by_hand(
         )
     else:
         for name in names:
-            print_line(name)
+            print_result(name)
         console.print(
             f"{len(names)} operators, the fewest; they are the domain's hand-written ones, as "
             f"{domain.name} has no skills yet: steps are not predicted"
@@ -121,7 +121,7 @@ def _show(result: PlanningResult, json: bool) -> None:
         )
         return
     for option, steps in edges:
-        print_line(f"{steps:5d}  {option}")
+        print_result(f"{steps:5d}  {option}")
     if result.fails:
         console.print(f"this plan fails in the model, near the goal: {result.fails}")
     bound = "" if result.bound is None else f"; bound {bound_as_text(result.bound)}"

@@ -25,7 +25,7 @@ from slap_ros.acquisition.proposals.proposer_names import (
 )
 from slap_ros.api.command_options import Preset
 from slap_ros.api.proposing import answer, request_for
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.cli.operators import print_operator
 from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Seed
 from slap_ros.cli.outputs import write_files
@@ -148,11 +148,11 @@ def _show(proposal: Proposal) -> None:
     for operator in proposal.operators:
         print_operator(operator, proposal.rewards.get(operator.name))
     for remark in proposal.remarks:
-        console.print(f"remark: {remark}")
-    console.print(f"plan: {', '.join(proposal.plan or ()) or 'nothing to do'}")
+        print_result(f"remark: {remark}")
+    print_result(f"plan: {', '.join(proposal.plan or ()) or 'nothing to do'}")
     made = proposal.provenance
     source = f" by {made.model} at {made.source}" if made.model else f" ({made.source})"
-    console.print(
+    print_result(
         f"proposer {made.proposer}{source if made.source else ''}, rewarder "
         f"{made.rewarder or 'none'}; {made.attempts} attempts, {made.tokens} tokens"
     )

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from slap_ros.acquisition.proposals.inquiry import described
-from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.console import print_json, print_result, warn
 from slap_ros.cli.operators import print_operator
 from slap_ros.cli.options import Json
 from slap_ros.domains import get_domain
@@ -39,12 +39,12 @@ def skills(
     for reason in read.refused:
         warn(f"a skill is left out: {reason}")
     if isinstance(answered_by := about.get("answered_by"), dict):
-        console.print(f"operators or rewards are {described(answered_by)}")
+        print_result(f"operators or rewards are {described(answered_by)}")
     progress = about.get("progress_on_fresh_tasks")
     reached = "" if progress is None else f", task progress {progress:.2f} on fresh tasks"
     made_by = " and ".join(str(about[who]) for who in ("proposer", "rewarder") if who in about)
-    console.print(f"proposer and rewarder: {made_by or 'not known'}")
-    console.print(f"{len(read.skills)} skills of {read.domain}, digest {read.digest}{reached}")
+    print_result(f"proposer and rewarder: {made_by or 'not known'}")
+    print_result(f"{len(read.skills)} skills of {read.domain}, digest {read.digest}{reached}")
 
 
 def _data(library: SkillLibrary) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def _show(skill: AcquiredSkill) -> None:
     if "success" not in record:
         return
     blind = record.get("vacuity") or {}
-    console.print(
+    print_result(
         f"  success {record['success']:.2f} from fresh states, of constant and random actions "
         f"{blind.get('success', float('nan')):.2f}; {record['steps']} environment steps; began "
         f"with {beginning(record.get('began_with') or {})}"

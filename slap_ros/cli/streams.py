@@ -18,15 +18,19 @@ class Stdout:
     def __init__(self) -> None:
         self._kept: TextIO | None = None  # while it is
 
+    @property
+    def stream(self) -> TextIO:
+        """Where data goes."""
+        return self._kept or sys.stdout
+
     def write_line(self, line: str) -> None:
         """Write a line of data, at once.
 
         Raises:
             OSError: It cannot be written.
         """
-        stream = self._kept or sys.stdout
-        stream.write(f"{line}\n")
-        stream.flush()
+        self.stream.write(f"{line}\n")
+        self.stream.flush()
 
     @contextmanager
     def kept_for_data(self) -> Iterator[None]:
@@ -58,8 +62,9 @@ def _moved_descriptor(stream: TextIO) -> Iterator[TextIO]:
     kept = os.dup(number)
     os.dup2(stderr, number)
     try:
+        # As on stderr: a terminal of few letters gets the others written out.
         with os.fdopen(
-            kept, "w", encoding=stream.encoding, errors=stream.errors, closefd=False
+            kept, "w", encoding=stream.encoding, errors="backslashreplace", closefd=False
         ) as file:
             yield file
     finally:

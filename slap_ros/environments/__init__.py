@@ -7,7 +7,7 @@ Read ``task_env.py`` first; then what it is put together from: ``slots.py`` and 
 ``skill_env.py`` are what our own learners learn in, by ``mdp_env.py``. ``registration.py`` gives
 ``gymnasium.make`` their names.
 
-Importing the package registers them, and imports nothing but Gymnasium.
+Importing the package registers them, and imports no domain and no learner.
 """
 
 from slap_ros.environments.registration import register

@@ -7,8 +7,11 @@ Gymnasium 1.0 looks for no plug-ins any more: whoever wants environments imports
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
+
+from slap_ros.domains.registry import domain_names
 
 if TYPE_CHECKING:
     from slap_ros.environments.task_env import TaskEnv
@@ -52,16 +55,34 @@ MADE_BY: Mapping[str, Mapping[str, str]] = {  # by what in the package
 
 
 def register() -> None:
-    """Register the environments of each of our domains."""
+    """Register the environments of each of our domains, and the tasks of each other one."""
     import gymnasium
 
-    for maker, names in MADE_BY.items():
+    others = {"registration:make_task_env": tasks_of_others(domain_names())}
+    for maker, names in (*MADE_BY.items(), *others.items()):
         for name, domain in names.items():
             gymnasium.register(
                 f"{NAMESPACE}/{name}",
                 entry_point=f"slap_ros.environments.{maker}",
                 kwargs={"domain": domain},
             )
+
+
+def tasks_of_others(domains: Iterable[str]) -> dict[str, str]:
+    """Names for the tasks of domains of other distributions: ``Marbles-v0`` for ``marbles``.
+
+    Args:
+        domains: Names of all domains, ours among them.
+
+    Returns:
+        Domains by their names within the namespace. Of two with one name, the first has it.
+    """
+    found = dict(TASKS)
+    for domain in domains:
+        words = re.findall(r"[A-Za-z0-9]+", domain)  # a name may have any letters, Gymnasium's not
+        if words and domain not in TASKS.values():
+            found.setdefault("".join(word[0].upper() + word[1:] for word in words) + "-v0", domain)
+    return {name: domain for name, domain in found.items() if name not in TASKS}
 
 
 def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **options: Any) -> TaskEnv:

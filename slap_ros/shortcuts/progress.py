@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from slap_ros.learning.json_lines import decoded_lines
 from slap_ros.learning.stored_keys import restored, stored
@@ -21,6 +21,7 @@ from slap_ros.shortcuts.shortcut_library import save_shortcut
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
+T = TypeVar("T")
 CHECKPOINT_S = 30.0  # time between checkpoints
 SNAPSHOTS = 12  # approximate number of snapshots of a shortcut while it is learned
 
@@ -56,11 +57,19 @@ def latest(folder: ShortcutWorkFolder) -> dict[int, Progress]:
     Raises:
         InvalidParameterError: The file is damaged.
     """
+    return dict(_lines(folder, lambda one: (int(one["stage"]), _restored(one))))
+
+
+def _lines(folder: ShortcutWorkFolder, decode: Callable[[Mapping[str, Any]], T]) -> Iterable[T]:
+    """What the lines of a progress file hold; nothing where there is none."""
     if not folder.progress.exists():
-        return {}
-    advice = "remove the folder to learn the shortcut again"
-    lines = decoded_lines(folder.progress, lambda one: (int(one["stage"]), _restored(one)), advice)
-    return dict(lines)
+        return ()
+    return decoded_lines(folder.progress, decode, "remove the folder to learn the shortcut again")
+
+
+def _cpu_s_before(folder: ShortcutWorkFolder) -> float:
+    """Processor time of all processes that learned in a folder, s; 0 of versions before 0.2."""
+    return max(_lines(folder, lambda one: float(one.get("cpu_s", 0.0))), default=0.0)
 
 
 def _restored(line: Mapping[str, Any]) -> Progress:
@@ -94,7 +103,7 @@ class ProgressRecorder:
         """Go on from what is in a folder."""
         self._folder = folder
         self._began = self._saved = monotonic()
-        self._cpu_s = _cpu_s()
+        self._cpu_s_at_start = _cpu_s() - _cpu_s_before(folder)  # as if it had done all of it
         self._latest = latest(folder)
 
     def of(self, stage: int, learner: SavableLearner) -> Callable[[Progress], bool]:
@@ -102,8 +111,8 @@ class ProgressRecorder:
 
         def report(progress: Progress) -> bool:
             self._latest[stage] = progress
-            seconds = monotonic() - self._began
-            self._folder.append({"stage": stage, **stored(progress), "seconds": seconds})
+            times = {"seconds": monotonic() - self._began, "cpu_s": self._cpu_s}
+            self._folder.append({"stage": stage, **stored(progress), **times})
             if monotonic() - self._saved > CHECKPOINT_S:
                 learner.save(self._folder.checkpoint(stage))
                 self._saved = monotonic()
@@ -120,6 +129,11 @@ class ProgressRecorder:
         """Environment steps of all stages so far."""
         return sum(progress.steps for progress in self._latest.values())
 
+    @property
+    def _cpu_s(self) -> float:
+        """Processor time so far, s, that of interrupted processes included."""
+        return _cpu_s() - self._cpu_s_at_start
+
     def record(self) -> dict[str, str | int | float]:
         """The figures by name; success and length are those of the last episodes, with noise."""
         last = self._latest[max(self._latest)]
@@ -128,7 +142,7 @@ class ProgressRecorder:
             "episodes": sum(progress.episodes for progress in self._latest.values()),
             "success": last.success,
             "length": last.length if last.length == last.length else -1.0,
-            "cpu_s": _cpu_s() - self._cpu_s,
+            "cpu_s": self._cpu_s,
         }
 
 

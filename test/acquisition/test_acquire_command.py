@@ -36,7 +36,7 @@ def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     shown = slap("skills", tmp_path / "one", "--json")
     (skill,) = json.loads(shown.stdout)["skills"]
     assert (skill["operator"]["name"], skill["seed"]) == ("Pick", 0)
-    assert "Holding(?thing)" in slap("skills", tmp_path / "one").stderr
+    assert "Holding(?thing)" in slap("skills", tmp_path / "one").stdout
     begin = ("--from", tmp_path / "one", "--set", "warm_start.least_success=0")  # it knows little
     again = slap("acquire", "points", "--output", tmp_path / "two", *begin, "--json", *BUDGET)
     record = json.loads(again.stdout)
@@ -44,7 +44,7 @@ def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     assert " --from one " in record["command"]  # without the path of this machine
     (second,) = json.loads(slap("skills", tmp_path / "two", "--json").stdout)["skills"]
     assert second["began_with"]["similarity"] == 1.0
-    assert "(similarity 1.00, success" in slap("skills", tmp_path / "two").stderr
+    assert "(similarity 1.00, success" in slap("skills", tmp_path / "two").stdout
 
 
 @pytest.mark.training
@@ -62,7 +62,7 @@ def test_operators_and_rewards_come_from_whoever_is_named(tmp_path, in_this_proc
     assert json.loads(slap(*asked, *by).stdout) == record
     other = slap(*asked)
     assert "has another training, of `slap acquire points" in " ".join(other.stderr.split())
-    shown = slap("skills", tmp_path / "library").stderr
+    shown = slap("skills", tmp_path / "library").stdout
     assert "AchieveHolding(?thing: thing)" in shown
     assert "proposer and rewarder: induced and composed" in shown
 
@@ -90,7 +90,7 @@ def test_what_a_script_said_is_never_taken_for_a_models(tmp_path, in_this_proces
     assert replayed["answered_by"]["scripted"]
     assert replayed["digest"] == recorded["digest"]
     assert "a script's" in again.stderr
-    assert "replayed from recording" in slap("skills", tmp_path / "replayed").stderr
+    assert "replayed from recording" in slap("skills", tmp_path / "replayed").stdout
 
 
 @pytest.mark.parametrize(

@@ -14,16 +14,18 @@ from slap_ros.bags import (
     bag_digest,
     bag_info,
     evaluate_bag,
+    mcap_reader,
     mcap_writer,
     read_bag,
     replay_bag,
 )
-from slap_ros.bags.mcap_records import MAGIC, RECORD, Opcode
+from slap_ros.bags.mcap_records import CHUNK, MAGIC, RECORD, U32, U64, Opcode
 from slap_ros.errors import DamagedBagError, SlapError
 from slap_ros.messages.typestore import typestore
 from support.truthful_run import Script, record
 
 Truth = list[tuple[str, int, bytes]]
+CHUNK_HEAD = RECORD.size + CHUNK.size + U32.size + U64.size  # bytes before its records
 
 
 def content(path: Path) -> tuple[Truth, str | None]:
@@ -111,6 +113,66 @@ def test_a_corrupted_bag_yields_what_precedes_the_damage(
         assert read == truth[: len(read)], (case, position)
 
 
+def chunks_of(data: bytes) -> list[tuple[int, int]]:
+    """Where each chunk begins and ends in a file."""
+    chunks = []
+    start = len(MAGIC)
+    while start < len(data) - len(MAGIC):
+        opcode, length = RECORD.unpack_from(data, start)
+        end = start + RECORD.size + length
+        if opcode == Opcode.CHUNK:
+            chunks.append((start, end))
+        start = end
+    return chunks
+
+
+def test_a_flipped_bit_in_any_chunk_costs_nothing_and_is_told(
+    many_chunks: Path, truth: Truth, damaged: Callable[[bytes], Path]
+) -> None:
+    data = original(many_chunks)
+    rng = random.Random(4)
+    for start, end in chunks_of(data):
+        flipped = bytearray(data)
+        flipped[rng.randrange(start + CHUNK_HEAD, end)] ^= 1 << rng.randrange(8)
+        read, damage = content(damaged(bytes(flipped)))
+        assert read == truth
+        assert damage is not None
+        assert damage.endswith(
+            f"has a flipped bit in the chunk at byte {start}, which was corrected"
+        )
+
+
+def test_flipped_bits_before_other_damage_are_told_with_it(
+    many_chunks: Path, truth: Truth, damaged: Callable[[bytes], Path]
+) -> None:
+    data = bytearray(original(many_chunks))
+    chunks = chunks_of(bytes(data))
+    for _, end in chunks[:3]:
+        data[end - 1] ^= 0x40
+    read, damage = content(damaged(bytes(data[: chunks[-1][0]])))
+    assert damage is not None and "ends early" in damage
+    assert damage.endswith(
+        f"has a flipped bit in each of 3 chunks, the first at byte {chunks[0][0]}, which were "
+        "corrected"
+    )
+    assert 0 < len(read) < len(truth) and read == truth[: len(read)]
+
+
+def test_only_so_many_chunks_are_corrected(
+    many_chunks: Path,
+    truth: Truth,
+    damaged: Callable[[bytes], Path],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(mcap_reader, "MOST_CORRECTIONS", 2)
+    data = bytearray(original(many_chunks))
+    for _, end in chunks_of(bytes(data)):
+        data[end - 1] ^= 0x40
+    read, damage = content(damaged(bytes(data)))
+    assert damage is not None and "checksum is wrong; has a flipped bit in each of 2" in damage
+    assert 0 < len(read) < len(truth) and read == truth[: len(read)]
+
+
 def test_every_damage_to_a_message_is_noticed(
     many_chunks: Path, truth: Truth, damaged: Callable[[bytes], Path]
 ) -> None:
@@ -119,7 +181,7 @@ def test_every_damage_to_a_message_is_noticed(
     start = data.index(needle)
     for offset in range(0, len(needle), 7):
         flipped = bytearray(data)
-        flipped[start + offset] ^= 0x10
+        flipped[start + offset] ^= 0x30
         read, damage = content(damaged(bytes(flipped)))
         assert damage is not None and "checksum" in damage
         assert len(read) <= 80 and read == truth[: len(read)]
@@ -130,14 +192,7 @@ def test_a_lost_stretch_in_the_middle_is_noticed(
 ) -> None:
     """A whole chunk is gone, so that no checksum is wrong."""
     data = original(many_chunks)
-    chunks = []
-    start = len(MAGIC)
-    while start < len(data) - len(MAGIC):
-        opcode, length = RECORD.unpack_from(data, start)
-        end = start + RECORD.size + length
-        if opcode == Opcode.CHUNK:
-            chunks.append((start, end))
-        start = end
+    chunks = chunks_of(data)
     assert len(chunks) > 10
     for start, end in chunks[1:]:
         read, damage = content(damaged(data[:start] + data[end:]))

@@ -119,7 +119,7 @@ def test_commands_name_and_choose_ensembles(fleet: Path, tmp_path: Path) -> None
     chosen = slap("bag", "evaluate", fleet, "--json", *one)
     assert json.loads(chosen.stdout)["seed"] == SEEDS["/robot2"]
     table = slap("bag", "evaluate", fleet)
-    assert "/robot2: obstacle2d" in table.stderr
+    assert "/robot2: obstacle2d" in table.stdout
     render_it = ("bag", "render", fleet, "--size", "64x48", "--output", tmp_path / "a.gif")
     refused = slap(*render_it)
     assert refused.exit_code == ErrorCode.INVALID_PARAMETER

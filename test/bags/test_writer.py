@@ -17,6 +17,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 
 from slap_ros.bags import BagWriter, bag_info, read_bag
+from slap_ros.bags.bit_correction import CORRECTABLE_BYTES
 from slap_ros.errors import BagExistsError, ErrorCode, InvalidParameterError, StorageFullError
 from support.counting_writer import STATE, cdr
 from support.programs import environment, program
@@ -58,6 +59,18 @@ def test_the_reference_reader_finds_index_and_checksums_right(
         schemas = {schema.encoding for schema in reader.get_summary().schemas.values()}
     assert stamps == [m.stamp_ns for m in script.messages]
     assert schemas == {"ros2msg"}
+
+
+def test_no_chunk_is_too_long_for_a_flipped_bit_to_be_corrected(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag", {}) as writer:
+        for number in range(2000):
+            writer.write("/slap/state", STATE, number, cdr(number))
+    mcap = pytest.importorskip("mcap.reader")
+    with (tmp_path / "bag" / "bag_0.mcap").open("rb") as file:
+        chunks = mcap.make_reader(file).get_summary().chunk_indexes
+    sizes = [chunk.uncompressed_size for chunk in chunks]
+    assert len(sizes) > 5
+    assert max(sizes) <= CORRECTABLE_BYTES < max(sizes) + len(cdr(0)) + 100
 
 
 def test_messages_out_of_time_order_reach_other_readers(tmp_path: Path) -> None:

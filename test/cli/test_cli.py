@@ -237,7 +237,7 @@ def test_a_bag_that_another_run_has_begun_meanwhile_is_not_called_this_ones(netw
     ran = slap_alone("run", "obstacle2d", "--record", bag, "--report", tmp_path / "run.html")
     assert ran.returncode == 93, ran.stderr
     assert "recorder_node ended: BAG_EXISTS" in ran.stderr
-    assert "bag: " not in ran.stderr
+    assert "bag: " not in ran.stdout + ran.stderr
     assert list(tmp_path.iterdir()) == [bag]
 
 

@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 from typer.testing import CliRunner
 
-from slap_ros.cli.console import Stderr, console, exits, styled, visible
+from slap_ros.cli.console import Stderr, console, exits, print_result, styled, visible
 from slap_ros.errors import ErrorCode, InvalidParameterError
 
 HOSTILE = "[/x] [bold]b[/bold] :smile: \x1b[31mred\x07 \u202egnirts \udcff end"
@@ -38,6 +38,17 @@ def test_a_sentence_is_the_same_with_and_without_rich(capsys):
     assert "rich" not in vars(stderr)
     stderr.rich.print(HOSTILE)
     assert capsys.readouterr().err == alone == f"{SHOWN}\n"
+
+
+def test_a_result_is_as_plain_as_what_is_said(capsys):
+    table = Table("column", title=HOSTILE)
+    table.add_row(HOSTILE)
+    print_result(HOSTILE)
+    print_result(table)
+    print_result(styled("ok", "bold green", f" {HOSTILE}"))
+    printed = capsys.readouterr()
+    assert printed.out.count(SHOWN) == 4 and not printed.err
+    assert not set(printed.out) & set("\x1b\x07\u202e\udcff")
 
 
 def test_what_can_be_seen_stays():

@@ -138,7 +138,7 @@ def test_proposed_operators_follow_the_standard(tmp_path: Path) -> None:
     output = tmp_path / "proposal"
     result = invoke(tmp_path, PAIRS["survey"], "propose", "--output", str(output))
     assert result.exit_code == 0, result.stderr
-    assert "send(r, hill, hill, camp)" in " ".join(result.stderr.split())
+    assert "send(r, hill, hill, camp)" in " ".join(result.stdout.split())
     written = [
         (output / name).read_text(encoding="utf-8") for name in ("domain.pddl", "problem.pddl")
     ]

@@ -212,6 +212,43 @@ def test_ctrl_c_in_a_destructor_ends_a_node_without_a_word(network):
     assert "KeyboardInterrupt" not in process.stdout + process.stderr
 
 
+INTERRUPTED_TWICE = """
+import os, signal, sys
+from pathlib import Path
+from rclpy.node import Node
+from ensemble.entry_point import run_node
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+
+class Closing(Node):
+    def destroy_node(self):
+        interrupt()
+        Path(sys.argv[1]).write_text("closed")
+        super().destroy_node()
+
+def make():
+    node = Closing("closing")
+    node.create_timer(0.01, interrupt)
+    return node
+
+sys.exit(run_node("closing", make))
+"""
+
+
+def test_a_second_ctrl_c_lets_a_node_end_what_the_first_began(network, tmp_path):
+    """A recorder closes its bag then, and a robot's node brings the arm to rest."""
+    file = tmp_path / "closed"
+    process = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED_TWICE, str(file)],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert process.returncode == 0, process.stderr
+    assert file.exists()
+
+
 @pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
 @pytest.mark.parametrize("victim", [*slow("perception_node", "skill_server"), "planner_node"])
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):

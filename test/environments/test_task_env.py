@@ -18,7 +18,7 @@ from slap_ros.baselines.reverse_curriculum import demonstrated_tasks
 from slap_ros.domains import get_domain
 from slap_ros.environments.episode import TaskEpisode
 from slap_ros.environments.observations import ViewObservation
-from slap_ros.environments.registration import TASKS, make_task_env
+from slap_ros.environments.registration import TASKS, make_task_env, tasks_of_others
 from slap_ros.environments.slots import ObjectSlots
 from slap_ros.environments.task_rewards import STAGE, StagedReward
 from slap_ros.errors import (
@@ -51,6 +51,24 @@ def test_names_are_registered_and_nothing_else_is_imported():
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert ran.stdout.strip() == "{'domain': 'obstacle2d'} []", ran.stderr
+
+
+def test_domains_of_others_have_names_that_gymnasium_takes():
+    names = [
+        "obstacle2d",
+        "marbles",
+        "kinder_obstruction",
+        "my pegs!",
+        "obstacle-tower",
+        "ünder",
+        "_",
+    ]
+    assert tasks_of_others([*names, "my_pegs"]) == {
+        "Marbles-v0": "marbles",
+        "KinderObstruction-v0": "kinder_obstruction",
+        "MyPegs-v0": "my pegs!",
+        "Nder-v0": "ünder",
+    }
 
 
 @pytest.mark.filterwarnings("ignore:.*alternative render modes")

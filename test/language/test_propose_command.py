@@ -49,7 +49,7 @@ def test_operators_of_anyone_in_each_format(tmp_path: Path) -> None:
     text = (EXAMPLE / "printed.txt").read_text()
     repaired = text.replace("{In(?peg, ?hole)}", "{In(?peg, ?hole), HandEmpty()}")
     (tmp_path / "repaired.txt").write_text(repaired)
-    (tmp_path / "shown.txt").write_text(made.stderr)
+    (tmp_path / "shown.txt").write_text(made.stdout)
     for name in ("domain.pddl", "proposal.json", "repaired.txt", "shown.txt"):
         result = slap("propose", *TASK, "--operators", tmp_path / name, "--json")
         assert result.exit_code == 0, result.stderr
@@ -86,11 +86,11 @@ def test_a_server_is_asked_and_what_it_costs_is_shown(tmp_path: Path) -> None:
         command = ("propose", *TASK, "--proposer", "language", "--model", "m")
         result = slap(*command, "--base-url", server.url, "--cassette", f"record:{cassette}")
     assert result.exit_code == 0, result.stderr
-    assert "4 attempts, 440 tokens" in result.stderr
+    assert "4 attempts, 440 tokens" in result.stdout
     assert "goals_never_together" in result.stderr
     assert "answers are a script's" in result.stderr
     again = slap(*command, "--cassette", f"replay:{cassette}")
-    assert again.exit_code == 0 and "4 attempts, 440 tokens" in again.stderr
+    assert again.exit_code == 0 and "4 attempts, 440 tokens" in again.stdout
     assert "replayed from recording" in " ".join(again.stderr.split())
 
 
@@ -105,8 +105,8 @@ def test_a_bag_is_a_demonstration() -> None:
     bag = EXAMPLE.parent.parent / "test" / "bags" / "data" / "recorded_by_0.1.0"
     result = slap("propose", "obstacle2d", "--proposer", "induced", "--demonstrations", bag)
     assert result.exit_code == 0, result.stderr
-    assert "proposer induced (demonstrations: 1, from recorded_by_0.1.0)" in result.stderr
-    assert "seen once; each of its preconditions may be too many" in result.stderr
+    assert "proposer induced (demonstrations: 1, from recorded_by_0.1.0)" in result.stdout
+    assert "seen once; each of its preconditions may be too many" in result.stdout
 
 
 @pytest.mark.parametrize(

@@ -119,6 +119,22 @@ def test_entry_points_that_cannot_be_read_cost_only_their_distribution(content, 
     assert "entry points of broken: " in check.found
 
 
+def test_a_domain_of_others_is_a_gymnasium_environment(install):
+    """Also beside one that cannot be made, whose code nobody runs."""
+    pytest.importorskip("gymnasium")
+    pytest.importorskip("pybullet")
+    install({"sweeping": "support.sweeping:make"}, "sound")
+    install({"exits": "exits:make"}, "exits", exits="raise SystemExit(7)")
+    code = (
+        "import gymnasium, slap_ros.environments\n"
+        "env = gymnasium.make('slap_ros/Sweeping-v0')\n"
+        "seen, info = env.reset(seed=500)\n"
+        "print(info['success'], 'slap_ros/Exits-v0' in gymnasium.registry)"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert ran.stdout.strip() == "False True", ran.stderr
+
+
 @pytest.mark.slow
 def test_commands_go_on_beside_broken_domains(install):
     """The case that was seen: `slap domains` ended in a traceback of the stranger's."""

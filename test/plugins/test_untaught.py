@@ -149,7 +149,7 @@ def test_a_goal_that_no_domain_has_is_refused_by_name(installed):
 
 
 def test_domains_shows_what_skills_are_acquired_with(installed):
-    shown = slap("domains", "untaught").stderr
+    shown = slap("domains", "untaught").stdout
     assert "training\n" in shown
     assert "hand-written operators, without skills; a demonstrator has scripts" in shown
     data = json.loads(slap("domains", "untaught", "--json").stdout)

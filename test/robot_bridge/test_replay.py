@@ -140,12 +140,12 @@ def test_a_dry_run_says_all_of_it_and_moves_nothing(bag):
     data = json.loads(out)
     assert data["steps"] == len(recorded_joints(bag)) - 1
     assert data["violations"] == []
-    code, _, told = replay(
+    code, out, _ = replay(
         bag, "--to", "robot", "--dry-run", "--robot", "workspace=.2 -.5 .2 .8 .5 .9"
     )
     assert code == 72
-    assert "steps beyond its limits" in told
-    assert "outside the workspace" in told
+    assert "steps beyond its limits" in out
+    assert "outside the workspace" in out
 
 
 def test_nothing_moves_unless_somebody_says_so(bag):
