@@ -19,7 +19,7 @@ from robot_bridge.sensors import Sensors
 from slap_ros.core import Domain
 from slap_ros.errors import ControllerAbortedError, NoDetectionError, NoJointStateError
 from slap_ros.relational import State
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 
@@ -100,13 +100,13 @@ class Robot:
         Raises:
             SlapError: As :meth:`move_fingers`.
         """
-        if action is GripperAction.CLOSE:
-            gap = await self.move_fingers(GAP_SHUT)
-            if self.world.confirm_grasp(gap):
-                return
-        if action is not GripperAction.KEEP:  # to be opened, or closed around nothing
-            await self.move_fingers(GAP_OPEN)
+        if action.gap is None:
+            return
+        gap = await self.move_fingers(action.gap)
+        if action is GripperAction.OPEN:
             self.world.confirm_release()
+        elif not self.world.confirm_grasp(gap):  # closed around nothing
+            await self.actuate_gripper(GripperAction.OPEN)
 
     async def move_fingers(self, gap: float) -> float:
         """Move the fingers to ``gap`` m, or until they stall; the gap in m at which they stand.

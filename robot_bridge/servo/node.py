@@ -76,7 +76,6 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_goal
 from slap_ros.relational import State
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.robot.servoed_robot import ServoedRobot
 
@@ -161,8 +160,7 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
             return
         command = self._robot.plan_command(action)
         self._enter(ServoPhase.MOVING)
-        if command.gripper is not GripperAction.KEEP:
-            gap = GAP_SHUT if command.gripper is GripperAction.CLOSE else GAP_OPEN
+        if (gap := command.gripper.gap) is not None:
             settings = self._settings
             self._controllers.move_gripper(gap * settings.gripper_scale, settings.gripper_effort)
         self._controllers.follow(command.points)
