@@ -18,9 +18,9 @@ from slap_ros.relational import GroundAtom, State
 from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Limits
+from slap_ros.robot.measured_world import MeasuredWorld
 from slap_ros.robot.mujoco.arm import FINGER_FORCE, PERIOD_S
 from slap_ros.robot.mujoco.detectors import ExactDetector, ObjectDetector
-from slap_ros.robot.mujoco.measured_world import MeasuredWorld
 from slap_ros.robot.mujoco.plant_controllers import REACH, TOLERANCES, PlantControllers
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.tracking import TrackingSettings

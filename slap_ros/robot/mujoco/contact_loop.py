@@ -16,9 +16,9 @@ from collections.abc import Iterable
 from slap_ros.core import Action, Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import GroundAtom, State
+from slap_ros.robot.measured_world import MeasuredWorld
 from slap_ros.robot.mujoco.arm import PERIOD_S, ArmMotors
 from slap_ros.robot.mujoco.contact_state import measured_state
-from slap_ros.robot.mujoco.measured_world import MeasuredWorld
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.mujoco.plant_controllers import REACH, UNCHECKED, PlantControllers
