@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from ensemble.futures import wait_for_first
-from ensemble.robot_parameters import RobotParameters, action_name, arm_joints
+from ensemble.robot_parameters import PointToPointParameters, action_name, arm_joints
 from ensemble.steady_time import JumpFreeClock
 from robot_bridge.controllers import Controllers
 from robot_bridge.sensors import Sensors
@@ -31,7 +31,11 @@ class Robot:
     """A robot: its world as far as it is measured, and its controllers."""
 
     def __init__(
-        self, node: Node, domain: Domain, sampled: Callable[[], State], settings: RobotParameters
+        self,
+        node: Node,
+        domain: Domain,
+        sampled: Callable[[], State],
+        settings: PointToPointParameters,
     ) -> None:
         """Subscribe to its sensors and connect to its controllers.
 
