@@ -155,7 +155,7 @@ class Player(Node):
         if found:
             return found[-1]
         if self._robot.world.newest_joints_s <= since_s:
-            raise NoJointStateError(f"no joint positions {when}{self._robot.joint_advice}")
+            raise NoJointStateError(f"no joint positions {when}{self._robot.sensors.joint_advice}")
         if reasons:
             raise reasons[-1]
         raise self._robot.no_detection(since_s, when)
@@ -190,7 +190,7 @@ class Player(Node):
         if self._robot.world.newest_joints_s <= since_s:
             raise NoJointStateError(
                 f"no joint positions for {self._settings.joint_timeout} s {when}"
-                f"{self._robot.joint_advice}"
+                f"{self._robot.sensors.joint_advice}"
             )
         off = self._robot.world.joint_distance(joints)
         if off > self._settings.arrival_tolerance:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -57,7 +56,7 @@ class Robot:
             else sampled_scene_config(sampled())
         )
         self.world = RobotWorld(domain, scene_config, settings.limits, settings.tracking)
-        self.sensors = Sensors(node, self.world, settings.arm, self.clock)
+        self.sensors = Sensors(node, self.world, settings, self.clock)
         self.controllers = Controllers(
             node,
             action_name(settings.trajectory_action, settings.arm),
@@ -71,25 +70,6 @@ class Robot:
         self.controllers.hold()
         self.controllers.destroy()
         self.world.close()
-
-    def require_joints(self, since_s: float = -math.inf) -> None:
-        """Refuse to go on without news of where the joints are.
-
-        Args:
-            since_s: When news were asked for; s, of ``clock``.
-
-        Raises:
-            NoJointStateError: There were none for ``joint_timeout``.
-        """
-        silence = self.clock.now_s() - max(self.world.newest_joints_s, since_s)
-        if silence > self._settings.joint_timeout:
-            raise NoJointStateError(f"no joint positions for {silence:.1f} s{self.joint_advice}")
-
-    @property
-    def joint_advice(self) -> str:
-        """Why joint states were not used, for messages that miss them; empty where none came."""
-        refusal = self.sensors.joint_refusal
-        return f": they are refused, as {refusal}" if refusal else ""
 
     def no_detection(self, since_s: float, when: str) -> NoDetectionError:
         """The error that names what was not detected since then."""
@@ -150,6 +130,6 @@ class Robot:
         if sensors.gap is None or sensors.gap_s <= done_s:
             raise NoJointStateError(
                 f"no positions of the fingers within {settings.joint_timeout} s"
-                f"{self.joint_advice or ': are they among joint_states?'}"
+                f"{sensors.joint_advice or ': are they among joint_states?'}"
             )
         return sensors.gap
