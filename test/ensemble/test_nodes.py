@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from copy import deepcopy
 from functools import partial
 from pathlib import Path
@@ -96,19 +96,15 @@ def states(client):
 @pytest.mark.parametrize("order", [ALL, ALL[::-1]], ids=["sim first", "recorder first"])
 def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order):
     nodes = parameters(tmp_path / "bag")
-    with temporary_node(Listener) as (client, spinner):
-        running = []
+    with temporary_node(Listener) as (client, spinner), ExitStack() as running:
         for name in order:
-            launcher = ProcessLauncher({name: nodes[name]})
-            running.append(launcher.__enter__())
-            time.sleep(1.0)
+            running.enter_context(InProcessLauncher({name: nodes[name]}, spinner.executor))
+            spinner.spin_until(lambda: False, 1.0)
         assert spinner.spin_until(lambda: client.ready(True), LIMIT)
         result = solve(client, spinner)
         assert result.success
         closed = client.close_bag()
         assert spinner.spin_until(closed.done, LIMIT)
-        for launcher in running:
-            launcher.__exit__(None, None, None)
     found = evaluate_bag(tmp_path / "bag")
     assert found.runs[0].success
     assert found.states == found.compared == found.runs[0].plan_length + 1
@@ -212,12 +208,22 @@ def test_ctrl_c_in_a_destructor_ends_a_node_without_a_word(network):
     assert "KeyboardInterrupt" not in process.stdout + process.stderr
 
 
-@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
+@contextmanager
+def all_but(late):
+    """A client, what spins it, and in its process all nodes but one."""
+    others = {name: p for name, p in parameters().items() if name != late}
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(others, spinner.executor),
+    ):
+        yield client, spinner
+
+
+@pytest.mark.timeout(180)  # waits for a dead node
 @pytest.mark.parametrize("victim", [*slow("perception_node", "skill_server"), "planner_node"])
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):
     nodes = parameters()
-    others = {name: p for name, p in nodes.items() if name != victim}
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(others):
+    with all_but(victim) as (client, spinner):
         with ProcessLauncher({victim: nodes[victim]}) as first:
             assert spinner.spin_until(lambda: client.ready(False), LIMIT)
             assert solve(client, spinner).success
@@ -249,11 +255,10 @@ def test_a_skill_server_that_comes_after_the_plan_is_waited_for(network):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
+@pytest.mark.timeout(180)  # waits for a dead node
 def test_a_simulator_that_comes_back_opens_a_new_episode(network):
     nodes = parameters()
-    others = {name: p for name, p in nodes.items() if name != "sim_node"}
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(others):
+    with all_but("sim_node") as (client, spinner):
         for _ in range(2):
             with ProcessLauncher({"sim_node": nodes["sim_node"]}):
                 client.heard.clear()
