@@ -241,7 +241,10 @@ def test_a_skill_server_that_comes_after_the_plan_is_waited_for(network):
     nodes = parameters()
     nodes["planner_node"]["patience"] = 24.0  # 120 s for it to come
     late = {"skill_server": nodes.pop("skill_server")}
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(nodes):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(nodes, spinner.executor),
+    ):
         assert spinner.spin_until(client._solve.server_is_ready, LIMIT)
         sent = client.send((), 0, 5)
         assert spinner.spin_until(lambda: PLAN_EVENT in client.newest, LIMIT)
