@@ -35,6 +35,18 @@ def parameter(default: Any, description: str, low: float = 0.0, high: float = MA
     return field(default=default, metadata={"description": description, "low": low, "high": high})
 
 
+def with_default(kind: type, name: str, default: Any) -> Any:
+    """A field of a parameters dataclass with another default.
+
+    Args:
+        kind: Dataclass that has the field.
+        name: Name of the field.
+        default: What it is where nothing else is said.
+    """
+    (item,) = (item for item in fields(kind) if item.name == name)
+    return field(default=default, metadata=item.metadata)
+
+
 def read_parameters(node: Node, kind: type[P]) -> P:
     """Declare every field of ``kind`` as a read-only parameter and read it.
 

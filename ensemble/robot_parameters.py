@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 from ensemble.camera_parameters import CameraParameters
-from ensemble.parameters import MAX_SEED, parameter, parse_parameters
+from ensemble.parameters import MAX_SEED, parameter, parse_parameters, with_default
 from ensemble.world_parameters import WorldParameters
 from slap_ros.errors import InvalidParameterError
 from slap_ros.robot.blending import MotionLimits
@@ -59,38 +59,51 @@ def base_frame(arm: str) -> str:
     return f"{arm}_link0"
 
 
-def _workspace(numbers: Sequence[float]) -> Workspace:
-    """The workspace that a parameter says.
-
-    Raises:
-        InvalidParameterError: It has not six numbers, or is empty.
-    """
-    if len(numbers) != len(WORKSPACE):
-        raise InvalidParameterError("parameter workspace is x y z at its lowest and at its highest")
-    x, y, z, to_x, to_y, to_z = numbers
-    return Workspace((x, y, z), (to_x, to_y, to_z))
-
-
 @dataclass(frozen=True)
 class RobotParameters:
-    """What a robot is: see the docstring of ``robot_bridge.node``."""
+    """What a robot is, and how well it is measured: see the docstring of ``robot_bridge.node``."""
 
-    scene: str = parameter("", "a scene file; empty: the sampled task's objects")
     arm: str = parameter("panda", "panda or fr3")
-    speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
     workspace: tuple[float, ...] = parameter(
         WORKSPACE, "m, fingertips, lowest x y z, highest", low=-10.0
     )
-    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
     gripper_scale: float = parameter(0.5, "position to be sent per m between the fingers")
     gripper_effort: float = parameter(20.0, "N")
     position_noise: float = parameter(0.002, "m, of detections, along each axis")
     turn_noise: float = parameter(0.01, "rad, of detections, about each axis")
+    joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
+
+    @property
+    def space(self) -> Workspace:
+        """Where the fingertips may be.
+
+        Raises:
+            InvalidParameterError: It has not six numbers, or is empty.
+        """
+        if len(self.workspace) != len(WORKSPACE):
+            raise InvalidParameterError(
+                "parameter workspace is x y z at its lowest and at its highest"
+            )
+        x, y, z, to_x, to_y, to_z = self.workspace
+        return Workspace((x, y, z), (to_x, to_y, to_z))
+
+    @property
+    def tracking(self) -> TrackingSettings:
+        """How well detections can be trusted."""
+        return TrackingSettings(self.position_noise, self.turn_noise)
+
+
+@dataclass(frozen=True)
+class PointToPointParameters(RobotParameters):
+    """Those of a robot that moves from rest to rest, one goal of its controllers at a time."""
+
+    scene: str = parameter("", "a scene file; empty: the sampled task's objects")
+    speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
+    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     hidden_after: int = parameter(
         0, "pictures in a row without an object after which it is where it was; 0: never", high=64
     )
-    joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
     controller_timeout: float = parameter(0.5, "s that a controller may take longer than it should")
     gripper_timeout: float = parameter(5.0, "s that the gripper may take")
     arrival_tolerance: float = parameter(0.1, "rad that a joint may be off after a motion")
@@ -102,26 +115,18 @@ class RobotParameters:
         Raises:
             InvalidParameterError: An unknown arm, or a speed or workspace that there is not.
         """
-        return arm_limits(self.arm).scaled(self.speed, _workspace(self.workspace))
+        return arm_limits(self.arm).scaled(self.speed, self.space)
 
     @property
     def tracking(self) -> TrackingSettings:
-        """How well detections can be trusted."""
-        return TrackingSettings(
-            self.position_noise, self.turn_noise, hidden_after=self.hidden_after
-        )
+        """How well detections can be trusted, and when an object is taken to be hidden."""
+        return replace(super().tracking, hidden_after=self.hidden_after)
 
 
 @dataclass(frozen=True)
-class RobotBridgeParameters(RobotParameters, WorldParameters):
-    """Those of a robot, and how long robot_bridge waits: see the docstring of its node."""
+class BridgeParameters(WorldParameters):
+    """The domain that runs on a robot, and how long a bridge to it waits."""
 
-    domain: str = parameter("obstacle_tower", "which domain")
-    preset: str = parameter("", "one that obeys the joints' speed limit")
-    horizon: int = parameter(
-        1, "commands that the arm executes without a stop between them, at most", low=1, high=8
-    )
-    settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
     detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
     hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
 
@@ -129,6 +134,18 @@ class RobotBridgeParameters(RobotParameters, WorldParameters):
     def choice(self) -> DomainChoice:
         """The domain that runs, whose states are measured."""
         return replace(super().choice, measured=True)
+
+
+@dataclass(frozen=True)
+class RobotBridgeParameters(PointToPointParameters, BridgeParameters):
+    """Those of the bridge that waits for each motion: see the docstring of its node."""
+
+    domain: str = parameter("obstacle_tower", "which domain")
+    preset: str = parameter("", "one that obeys the joints' speed limit")
+    horizon: int = parameter(
+        1, "commands that the arm executes without a stop between them, at most", low=1, high=8
+    )
+    settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
 
     @property
     def motion_limits(self) -> MotionLimits:
@@ -142,49 +159,21 @@ class RobotBridgeParameters(RobotParameters, WorldParameters):
 
 
 @dataclass(frozen=True)
-class ServoBridgeParameters(WorldParameters):
-    """What a robot at a bench is: see the docstring of ``robot_bridge.servo.node``."""
+class ServoBridgeParameters(RobotParameters, BridgeParameters):
+    """Those of a bridge at a bench: see the docstring of ``robot_bridge.servo.node``."""
 
     domain: str = parameter("stack_at_target", "which domain")
-    arm: str = parameter("panda", "prefix of joints and frames")
-    workspace: tuple[float, ...] = parameter(
-        BENCH, "m, fingertips, lowest x y z, highest", low=-10.0
-    )
+    workspace: tuple[float, ...] = with_default(RobotParameters, "workspace", BENCH)
+    position_noise: float = with_default(RobotParameters, "position_noise", 0.0005)
+    turn_noise: float = with_default(RobotParameters, "turn_noise", 0.005)
     trajectory_topic: str = parameter(TRAJECTORY_TOPIC, "topic of the arm's controller")
-    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
-    gripper_scale: float = parameter(0.5, "position to be sent per m between the fingers")
-    gripper_effort: float = parameter(20.0, "N")
-    position_noise: float = parameter(0.0005, "m, of detections, along each axis")
-    turn_noise: float = parameter(0.005, "rad, of detections, about each axis")
-    joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
-    detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
-    hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
     pace: float = parameter(
         1.0, "how many times faster than a real robot's its time passes", low=0.01, high=1e3
     )
 
-    @property
-    def choice(self) -> DomainChoice:
-        """The domain that runs, whose states are measured."""
-        return replace(super().choice, measured=True)
-
-    @property
-    def space(self) -> Workspace:
-        """Where the fingertips may be.
-
-        Raises:
-            InvalidParameterError: It has not six numbers, or is empty.
-        """
-        return _workspace(self.workspace)
-
-    @property
-    def tracking(self) -> TrackingSettings:
-        """How well detections can be trusted."""
-        return TrackingSettings(self.position_noise, self.turn_noise)
-
 
 @dataclass(frozen=True)
-class PlayerParameters(RobotParameters):
+class PlayerParameters(PointToPointParameters):
     """Those of a robot, and how far from where the recording begins things may be."""
 
     start_timeout: float = parameter(15.0, "s to wait for the robot and every object")
@@ -230,8 +219,8 @@ class MockRobotParameters(SimulatedRobotParameters):
 class MujocoRobotParameters(CameraParameters, SimulatedRobotParameters):
     """What a robot in MuJoCo is: see the docstring of ``robot_bridge.mujoco.node``."""
 
-    pose_noise: float = parameter(0.0, "m, of detections along each axis")
-    turn_noise: float = parameter(0.0, "rad, of detections about each axis")
+    pose_noise: float = with_default(SimulatedRobotParameters, "pose_noise", 0.0)
+    turn_noise: float = with_default(SimulatedRobotParameters, "turn_noise", 0.0)
     path_tolerance: float = parameter(0.2, "rad, by which a joint may be off its path; 0: any")
     goal_tolerance: float = parameter(0.05, "rad, by which a joint may be off at the end; 0: any")
     stopped_velocity: float = parameter(0.01, "rad/s, of a joint that stands; 0: any")
@@ -282,8 +271,8 @@ class FrankaDriverParameters(FrankaConnectionParameters, SimulatedRobotParameter
     speed: float = parameter(1.0, "fraction of the limits of velocity, acceleration and jerk")
     goal_tolerance: float = parameter(0.05, "rad, by which a joint may be off at the end")
     clients: str = parameter("robot_bridge robot_player", "nodes without which the arm holds")
-    pose_noise: float = parameter(0.0, "m, of detections along each axis")
-    turn_noise: float = parameter(0.0, "rad, of detections about each axis")
+    pose_noise: float = with_default(SimulatedRobotParameters, "pose_noise", 0.0)
+    turn_noise: float = with_default(SimulatedRobotParameters, "turn_noise", 0.0)
 
     @property
     def franka(self) -> FrankaSettings:

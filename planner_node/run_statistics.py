@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from slap_msgs.action import SolveTask
 
-from slap_ros.planning.options import OptionResult
+from slap_ros.planning.option_execution import OptionResult
 from slap_ros.planning.plan import PlanningResult
 
 

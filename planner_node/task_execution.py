@@ -37,7 +37,8 @@ from slap_ros.errors import (
     TaskCanceledError,
 )
 from slap_ros.planning.execution import DIVERGENCES, FINAL, UNPLANNED
-from slap_ros.planning.options import OptionResult, hold_option
+from slap_ros.planning.option_execution import OptionResult
+from slap_ros.planning.options import hold_option
 from slap_ros.planning.plan import PlanEdge, PlanningResult
 from slap_ros.planning.planner import ImprovingPlanner, Planner
 

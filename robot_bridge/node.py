@@ -119,10 +119,8 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("robot_bridge", RobotBridgeParameters, **kwargs)
         self._robot = Robot(self, self._domain, self._sampled_state, self._settings)
-        self._phase = Phase.STARTING
-        self._since_s = (
-            self._robot.clock.now_s()
-        )  # when the phase, or the measurement of a state, began
+        self._robot_clock, self._sensors = self._robot.clock, self._robot.sensors
+        self._enter(Phase.STARTING)
         self._motion: Future | None = None  # the newest: done when its controllers have answered
         self._measurement: StepMeasurement  # of the step under way
         self._stood = 0  # motions in a row in which the arm stood
@@ -145,24 +143,15 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
         holding = self._phase is Phase.FAULT or (self._phase is Phase.READY and self._is_idle)
         return {
             **super()._diagnostics(),
-            **self._robot.sensors.counts,
+            **self._sensors.counts,
             "phase": self._phase.name,
             "holding": holding,
         }
-
-    @property
-    def _is_idle(self) -> bool:
-        """Whether nothing has come for so long that the robot holds."""
-        return self._robot.clock.now_s() - self._since_s > self._settings.hold_after
 
     def _occupation(self) -> str:
         moving = self._phase in (Phase.MOVING, Phase.LOOKING)
         waits = self._phase is Phase.READY or (moving and self._expected and self._next is None)
         return "" if waits else self._phase.value
-
-    def _enter(self, phase: Phase) -> None:
-        self._phase = phase
-        self._since_s = self._robot.clock.now_s()
 
     def _fail(self, error: SlapError) -> None:
         """Hold until reset."""
@@ -178,7 +167,7 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
             self._next = action
             return
         try:
-            self._robot.require_joints()
+            self._sensors.require_joints()
         except NoJointStateError as error:
             self._fail(error)
             return
@@ -192,7 +181,7 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
         if state is None:
             self._move(expected=False)
         else:
-            self._since_s = self._robot.clock.now_s()
+            self._since_s = self._robot_clock.now_s()
             self._publish_step(state)
 
     def _move(self, expected: bool) -> None:
@@ -232,14 +221,14 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
             self._move(expected=True)
         elif self._phase in (Phase.MOVING, Phase.LOOKING):
             try:
-                self._robot.require_joints(self._since_s)
+                self._sensors.require_joints(self._since_s)
                 if self._phase is Phase.LOOKING:
                     self._measure()
             except SlapError as error:
                 self._fail(error)
 
     def _measure(self) -> None:
-        state = self._measurement.poll(self._robot.clock.now_s())
+        state = self._measurement.poll(self._robot_clock.now_s())
         if state is None:
             return
         self._require_motion()
@@ -273,11 +262,6 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
 
     # -- episodes -------------------------------------------------------------------------------
 
-    @property
-    def _has_waited(self) -> bool:
-        """Whether everything should have been there by now."""
-        return self._robot.clock.now_s() - self._since_s > self._settings.detection_timeout
-
     def _start(self) -> None:
         try:
             state = self._robot.world.measure_first(self._since_s)
@@ -285,9 +269,9 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
                 require_alone(self)
                 self._begin(state)
             elif self._has_waited:
-                raise self._unmeasured
+                raise self._unmeasured(self._since_s)
         except UNSTARTED as error:
-            self._say_not_yet(error, self._robot.clock.now_s())
+            self._say_not_yet(error)
 
     def _reset(self, request: ResetTask.Request) -> None:
         self._require_arranged(request)
@@ -300,21 +284,13 @@ class RobotBridge(Bridge[RobotBridgeParameters]):
         world = self._robot.world
         state = world.measure_first(self._since_s)
         if state is None:
-            raise self._unmeasured
+            raise self._unmeasured(self._since_s)
         space = self._domain.atom_space(world.scene_config.template)
         self._goal = decode_goal(request.goal, space)
         self._begin(state)
 
-    @property
-    def _unmeasured(self) -> SlapError:
-        """Why there is no state to begin in."""
-        try:
-            self._robot.require_joints()
-        except NoJointStateError as error:
-            return error
-        return self._robot.no_detection(
-            self._since_s, f"within {self._settings.detection_timeout} s"
-        )
+    def _no_detection(self, since_s: float) -> NoDetectionError:
+        return self._robot.no_detection(since_s, f"within {self._settings.detection_timeout} s")
 
     def _begin(self, state: State) -> None:
         world = self._robot.world

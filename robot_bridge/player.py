@@ -39,7 +39,7 @@ from slap_ros.errors import (
 from slap_ros.relational import State
 from slap_ros.robot.blended_run import BlendedRun
 from slap_ros.robot.dry_run import DryRun
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
 from slap_ros.robot.stretches import Stretch
 from slap_ros.worlds.features import POSE_FEATURES
@@ -155,7 +155,7 @@ class Player(Node):
         if found:
             return found[-1]
         if self._robot.world.newest_joints_s <= since_s:
-            raise NoJointStateError(f"no joint positions {when}{self._robot.joint_advice}")
+            raise NoJointStateError(f"no joint positions {when}{self._robot.sensors.joint_advice}")
         if reasons:
             raise reasons[-1]
         raise self._robot.no_detection(since_s, when)
@@ -165,15 +165,15 @@ class Player(Node):
     async def _execute(self, stretch: Stretch) -> None:
         first = stretch.waypoints[0]
         await self._require_at(stretch.start, f"before step {first.step}")
-        if first.gripper is not GripperAction.KEEP:
-            await self._grip(first)
+        await self._grip(first)
         if stretch.points:
             await self._robot.controllers.follow(stretch.points)
 
     async def _grip(self, waypoint: RecordedWaypoint) -> None:
-        closing = waypoint.gripper is GripperAction.CLOSE
-        gap = await self._robot.move_fingers(GAP_SHUT if closing else GAP_OPEN)
-        if closing:
+        if waypoint.gripper.gap is None:
+            return
+        gap = await self._robot.move_fingers(waypoint.gripper.gap)
+        if waypoint.gripper is GripperAction.CLOSE:
             waypoint.require_grasp(gap)
 
     async def _require_at(self, joints: tuple[float, ...], when: str) -> None:
@@ -190,7 +190,7 @@ class Player(Node):
         if self._robot.world.newest_joints_s <= since_s:
             raise NoJointStateError(
                 f"no joint positions for {self._settings.joint_timeout} s {when}"
-                f"{self._robot.joint_advice}"
+                f"{self._robot.sensors.joint_advice}"
             )
         off = self._robot.world.joint_distance(joints)
         if off > self._settings.arrival_tolerance:

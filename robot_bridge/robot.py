@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,14 +11,14 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from ensemble.futures import wait_for_first
-from ensemble.robot_parameters import RobotParameters, action_name, arm_joints
+from ensemble.robot_parameters import PointToPointParameters, action_name, arm_joints
 from ensemble.steady_time import JumpFreeClock
 from robot_bridge.controllers import Controllers
 from robot_bridge.sensors import Sensors
 from slap_ros.core import Domain
 from slap_ros.errors import ControllerAbortedError, NoDetectionError, NoJointStateError
 from slap_ros.relational import State
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 
@@ -31,7 +30,11 @@ class Robot:
     """A robot: its world as far as it is measured, and its controllers."""
 
     def __init__(
-        self, node: Node, domain: Domain, sampled: Callable[[], State], settings: RobotParameters
+        self,
+        node: Node,
+        domain: Domain,
+        sampled: Callable[[], State],
+        settings: PointToPointParameters,
     ) -> None:
         """Subscribe to its sensors and connect to its controllers.
 
@@ -53,7 +56,7 @@ class Robot:
             else sampled_scene_config(sampled())
         )
         self.world = RobotWorld(domain, scene_config, settings.limits, settings.tracking)
-        self.sensors = Sensors(node, self.world, settings.arm, self.clock)
+        self.sensors = Sensors(node, self.world, settings, self.clock)
         self.controllers = Controllers(
             node,
             action_name(settings.trajectory_action, settings.arm),
@@ -68,25 +71,6 @@ class Robot:
         self.controllers.destroy()
         self.world.close()
 
-    def require_joints(self, since_s: float = -math.inf) -> None:
-        """Refuse to go on without news of where the joints are.
-
-        Args:
-            since_s: When news were asked for; s, of ``clock``.
-
-        Raises:
-            NoJointStateError: There were none for ``joint_timeout``.
-        """
-        silence = self.clock.now_s() - max(self.world.newest_joints_s, since_s)
-        if silence > self._settings.joint_timeout:
-            raise NoJointStateError(f"no joint positions for {silence:.1f} s{self.joint_advice}")
-
-    @property
-    def joint_advice(self) -> str:
-        """Why joint states were not used, for messages that miss them; empty where none came."""
-        refusal = self.sensors.joint_refusal
-        return f": they are refused, as {refusal}" if refusal else ""
-
     def no_detection(self, since_s: float, when: str) -> NoDetectionError:
         """The error that names what was not detected since then."""
         missing = self.world.what_is_missing(since_s)
@@ -100,13 +84,13 @@ class Robot:
         Raises:
             SlapError: As :meth:`move_fingers`.
         """
-        if action is GripperAction.CLOSE:
-            gap = await self.move_fingers(GAP_SHUT)
-            if self.world.confirm_grasp(gap):
-                return
-        if action is not GripperAction.KEEP:  # to be opened, or closed around nothing
-            await self.move_fingers(GAP_OPEN)
+        if action.gap is None:
+            return
+        gap = await self.move_fingers(action.gap)
+        if action is GripperAction.OPEN:
             self.world.confirm_release()
+        elif not self.world.confirm_grasp(gap):  # closed around nothing
+            await self.actuate_gripper(GripperAction.OPEN)
 
     async def move_fingers(self, gap: float) -> float:
         """Move the fingers to ``gap`` m, or until they stall; the gap in m at which they stand.
@@ -146,6 +130,6 @@ class Robot:
         if sensors.gap is None or sensors.gap_s <= done_s:
             raise NoJointStateError(
                 f"no positions of the fingers within {settings.joint_timeout} s"
-                f"{self.joint_advice or ': are they among joint_states?'}"
+                f"{sensors.joint_advice or ': are they among joint_states?'}"
             )
         return sensors.gap

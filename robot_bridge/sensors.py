@@ -16,9 +16,9 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ensemble.interfaces import JOINT_STATES, SENSOR_DATA, TF, TF_STATIC
-from ensemble.robot_parameters import arm_joints, base_frame, finger_joints
+from ensemble.robot_parameters import RobotParameters, arm_joints, base_frame, finger_joints
 from ensemble.steady_time import JumpFreeClock
-from slap_ros.errors import InvalidMeasurementError
+from slap_ros.errors import InvalidMeasurementError, NoJointStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
@@ -33,6 +33,11 @@ QUIET = 10.0  # s between two log lines about joint states: a driver sends hundr
 
 class MeasuredRobot(Protocol):
     """What takes measurements; each may refuse one with an InvalidMeasurementError."""
+
+    @property
+    def newest_joints_s(self) -> float:
+        """Stamp of the newest joint positions, s; minus infinity without any."""
+        ...
 
     def add_joint_reading(self, reading: JointReading) -> None:
         """Take joint positions."""
@@ -57,29 +62,50 @@ class MeasuredRobot(Protocol):
 class Sensors:
     """Gives joint positions and detections to a robot's world; counts what that refuses."""
 
-    def __init__(self, node: Node, world: MeasuredRobot, arm: str, clock: JumpFreeClock) -> None:
+    def __init__(
+        self, node: Node, world: MeasuredRobot, settings: RobotParameters, clock: JumpFreeClock
+    ) -> None:
         """Subscribe to joint states and frames.
 
         Args:
             node: Node that subscribes.
             world: What takes the measurements.
-            arm: Prefix of the names of joints and frames.
+            settings: Parameters of the robot.
             clock: What measurements are dated by.
 
         Raises:
             InvalidParameterError: An unknown arm.
         """
         self._node, self._world, self._clock = node, world, clock
+        self._joint_timeout, arm = settings.joint_timeout, settings.arm
         self._arm, self._fingers = arm_joints(arm), finger_joints(arm)
         self._limits = arm_limits(arm)
         self._frames = StaticTransforms(base_frame(arm))
         self.counts: Counter[str] = Counter(readings=0, detections=0, refused_measurements=0)
         self.gap: float | None = None  # m, between the fingers
         self.gap_s = -math.inf  # when the gap was measured
-        self.joint_refusal: InvalidMeasurementError | None = None  # since the last good reading
+        self._joint_refusal: InvalidMeasurementError | None = None  # since the last good reading
         node.create_subscription(JOINT_STATES.type, JOINT_STATES.name, self._on_joints, SENSOR_DATA)
         node.create_subscription(TF.type, TF.name, self._on_frames, SENSOR_DATA)
         node.create_subscription(TF_STATIC.type, TF_STATIC.name, self._on_static, TF_STATIC.qos)
+
+    def require_joints(self, since_s: float = -math.inf) -> None:
+        """Refuse to go on without news of where the joints are.
+
+        Args:
+            since_s: When news were asked for; s, of the clock.
+
+        Raises:
+            NoJointStateError: There were none for ``joint_timeout``.
+        """
+        silence = self._clock.now_s() - max(self._world.newest_joints_s, since_s)
+        if silence > self._joint_timeout:
+            raise NoJointStateError(f"no joint positions for {silence:.1f} s{self.joint_advice}")
+
+    @property
+    def joint_advice(self) -> str:
+        """Why joint states were not used, for messages that miss them; empty where none came."""
+        return f": they are refused, as {self._joint_refusal}" if self._joint_refusal else ""
 
     def _on_joints(self, message: JointState) -> None:
         """The arm's joints, the fingers', or both; others are ignored."""
@@ -89,7 +115,7 @@ class Sensors:
             self._take_fingers(joints.position, stamp_s)
             self._take_arm(joints, stamp_s)
         except InvalidMeasurementError as error:
-            self.joint_refusal = error
+            self._joint_refusal = error
             self.counts["refused_measurements"] += 1
             self._node.get_logger().warning(f"refused: {error}", throttle_duration_sec=QUIET)
 
@@ -108,7 +134,7 @@ class Sensors:
         if all(map(math.isnan, velocities)):
             velocities = ()  # ros2_control's joint_state_broadcaster: not measured
         self._world.add_joint_reading(JointReading(stamp_s, positions, velocities, self.gap))
-        self.joint_refusal = None
+        self._joint_refusal = None
         self.counts["readings"] += 1
 
     def _on_static(self, message: TFMessage) -> None:

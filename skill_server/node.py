@@ -63,7 +63,7 @@ from skill_server.requested_option import requested_option
 from skill_server.skill_execution import SkillExecution, result
 from skill_server.skill_publisher import SkillPublisher
 from slap_ros.errors import ErrorCode, NoStateError
-from slap_ros.planning.options import OptionExecution, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
 
 CHECK_PERIOD = 0.1  # s, between two looks at whether a skill is to be given up
 

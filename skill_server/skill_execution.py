@@ -21,7 +21,8 @@ from ensemble.patience import load_advice
 from skill_server.skill_publisher import SkillPublisher
 from slap_ros.core import Action
 from slap_ros.errors import ErrorCode, SlapError
-from slap_ros.planning.options import Option, OptionExecution, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
+from slap_ros.planning.options import Option
 
 
 @dataclass

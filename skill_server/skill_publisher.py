@@ -13,7 +13,8 @@ from ensemble import encode
 from ensemble.interfaces import COMMAND, SKILL_EVENTS
 from ensemble.observation import Observation
 from slap_ros.core import Action
-from slap_ros.planning.options import Option, OptionResult
+from slap_ros.planning.option_execution import OptionResult
+from slap_ros.planning.options import Option
 
 
 class SkillPublisher:

@@ -16,6 +16,7 @@ from rclpy.logging import LoggingSeverity, set_logger_level
 
 from support import leftovers
 
+HERE = Path(__file__).parent
 # Apart from those of embedded_ros' own tests, and below the ports that the kernel gives to anybody.
 DOMAIN_IDS = range(2, 60)
 _next_ids = itertools.cycle(DOMAIN_IDS)
@@ -48,6 +49,9 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
+    # Those that build the site and the wheels, beside this file, take longest. In their turn they
+    # would come last, and processors would wait for them.
+    items.sort(key=lambda item: item.path.parent != HERE)
     for item in items:
         for mark, fixtures in MARKED_BY.items():
             if fixtures & set(getattr(item, "fixturenames", ())):

@@ -52,7 +52,6 @@ Action clients:
 
 from __future__ import annotations
 
-import math
 from enum import Enum
 from typing import Any
 
@@ -76,7 +75,6 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_goal
 from slap_ros.relational import State
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.robot.servoed_robot import ServoedRobot
 
@@ -115,7 +113,7 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
             settings.pace,
         )
         self._robot_clock = JumpFreeClock(self)
-        self._sensors = Sensors(self, self._robot, settings.arm, self._robot_clock)
+        self._sensors = Sensors(self, self._robot, settings, self._robot_clock)
         self._controllers = ServoControllers(
             self,
             action_name(settings.trajectory_topic, settings.arm),
@@ -124,7 +122,7 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
             self._fail,
         )
         self._period_s = self._domain.execution.control_period_s / settings.pace
-        self._phase, self._since_s = ServoPhase.STARTING, self._robot_clock.now_s()
+        self._enter(ServoPhase.STARTING)
         create_timer(self, POLL_PERIOD, self._poll)
         self._publish_domain()
 
@@ -135,16 +133,13 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
         super().destroy_node()
 
     def _diagnostics(self) -> dict[str, object]:
-        idle = self._robot_clock.now_s() - self._since_s > self._settings.hold_after
-        holding = self._phase is ServoPhase.FAULT or (self._phase is ServoPhase.READY and idle)
+        ready = self._phase is ServoPhase.READY
+        holding = self._phase is ServoPhase.FAULT or (ready and self._is_idle)
         counts = {**super()._diagnostics(), **self._sensors.counts}
         return {**counts, "phase": self._phase.name, "holding": holding}
 
     def _occupation(self) -> str:
         return "" if self._phase is ServoPhase.READY else self._phase.value
-
-    def _enter(self, phase: ServoPhase) -> None:
-        self._phase, self._since_s = phase, self._robot_clock.now_s()
 
     def _fail(self, error: SlapError) -> None:
         """Hold until reset: no trajectory follows the last one."""
@@ -155,14 +150,13 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
 
     def _apply(self, action: Action) -> None:
         try:
-            self._require_joints()
+            self._sensors.require_joints()
         except NoJointStateError as error:
             self._fail(error)
             return
         command = self._robot.plan_command(action)
         self._enter(ServoPhase.MOVING)
-        if command.gripper is not GripperAction.KEEP:
-            gap = GAP_SHUT if command.gripper is GripperAction.CLOSE else GAP_OPEN
+        if (gap := command.gripper.gap) is not None:
             settings = self._settings
             self._controllers.move_gripper(gap * settings.gripper_scale, settings.gripper_effort)
         self._controllers.follow(command.points)
@@ -183,7 +177,7 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
         """Publish the state of a period that is over, once there are joint positions since."""
         late = self._robot_clock.now_s() - over_s > self._settings.detection_timeout
         try:
-            self._require_joints(over_s)
+            self._sensors.require_joints(over_s)
             state = self._robot.measure(over_s)
             if state is None and late:
                 raise self._unmeasured(over_s)
@@ -198,41 +192,19 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
                 self._enter(ServoPhase.READY)
                 self._publish_step(state)
 
-    def _require_joints(self, since_s: float = -math.inf) -> None:
-        """Refuse to go on without news of where the joints are.
-
-        Raises:
-            NoJointStateError: There were none for ``joint_timeout``.
-        """
-        silence = self._robot_clock.now_s() - max(self._robot.newest_joints_s, since_s)
-        if silence > self._settings.joint_timeout:
-            refusal = self._sensors.joint_refusal
-            why = f": they are refused, as {refusal}" if refusal else ""
-            raise NoJointStateError(f"no joint positions for {silence:.1f} s{why}")
-
     def _require_detections(self) -> None:
         """Hold where an object was not detected for too long."""
         since_s = self._robot_clock.now_s() - self._settings.detection_timeout
         if self._robot.undetected(since_s):
             self._fail(self._unmeasured(since_s))
 
-    def _unmeasured(self, since_s: float) -> SlapError:
-        """Why there is no state."""
-        try:
-            self._require_joints()
-        except NoJointStateError as error:
-            return error
+    def _no_detection(self, since_s: float) -> NoDetectionError:
         missing = ", ".join(self._robot.undetected(since_s)) or "too few times: some object"
         return NoDetectionError(
             f"not detected within {self._settings.detection_timeout} s: {missing}"
         )
 
     # -- episodes -------------------------------------------------------------------------------
-
-    @property
-    def _has_waited(self) -> bool:
-        """Whether everything should have been there by now."""
-        return self._robot_clock.now_s() - self._since_s > self._settings.detection_timeout
 
     def _start(self) -> None:
         try:
@@ -241,7 +213,7 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
             self._begin(state)
         except UNSTARTED as error:
             if self._has_waited:
-                self._say_not_yet(error, self._robot_clock.now_s())
+                self._say_not_yet(error)
 
     def _measured_first(self) -> State:
         """The state in which an episode begins.

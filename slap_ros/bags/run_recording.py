@@ -21,7 +21,7 @@ from slap_ros.messages.decode import NANOSECONDS
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.perception import ExactPerceiver
 from slap_ros.planning.execution import DIVERGENCES, EpisodeResult, PlanExecution
-from slap_ros.planning.options import OptionResult
+from slap_ros.planning.option_execution import OptionResult
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.versions import versions
 

@@ -25,7 +25,8 @@ from slap_ros.messages.interfaces import (
     TASK,
 )
 from slap_ros.perception import Percept
-from slap_ros.planning.options import Option, OptionKind, OptionResult
+from slap_ros.planning.option_execution import OptionResult
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.plan import PlanEdge, PlanningResult
 from slap_ros.relational import AtomSpace, GroundAtom, LiftedOperator, State
 from slap_ros.relational.pddl import write_domain

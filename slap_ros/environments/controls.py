@@ -16,7 +16,8 @@ from slap_ros.core import Action, Domain, World
 from slap_ros.core.acquisition import Primitive
 from slap_ros.environments.episode import TaskEpisode
 from slap_ros.errors import InvalidCommandError, NoSkillsError, SkillNotApplicableError
-from slap_ros.planning.options import Option, OptionExecution, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
+from slap_ros.planning.options import Option
 from slap_ros.planning.problem import GroundedOptions, ground_options
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.portable_math import on_grid

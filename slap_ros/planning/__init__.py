@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The abstract planning graph, search, and closed-loop execution.
 
-Read on in this order: ``options``, ``abstract_graph``, ``model``, ``search``, ``problem``,
-``graph_planner``, ``recovery``, ``planner``, ``execution``.
+Read on in this order: ``options``, ``option_execution``, ``abstract_graph``, ``model``, ``search``,
+``problem``, ``graph_planner``, ``recovery``, ``planner``, ``execution``.
 """

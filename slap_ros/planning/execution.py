@@ -20,7 +20,8 @@ from slap_ros.errors import (
     UnsolvableError,
 )
 from slap_ros.perception import ExactPerceiver, Perceiver, Percept
-from slap_ros.planning.options import Option, OptionExecution, OptionKind, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.plan import PlanEdge, PlanningResult
 from slap_ros.planning.planner import ImprovingPlanner, Planner
 from slap_ros.relational import AtomSpace, State

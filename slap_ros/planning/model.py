@@ -15,7 +15,8 @@ from slap_ros.errors import (
     SkillNotApplicableError,
     TaskCanceledError,
 )
-from slap_ros.planning.options import Option, OptionExecution, OptionResult, never
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
+from slap_ros.planning.options import Option, never
 from slap_ros.relational import AtomSpace, State, Target
 
 REACHED = OptionResult(ErrorCode.NONE)

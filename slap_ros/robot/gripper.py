@@ -13,8 +13,15 @@ GAP_SHUT = 0.0  # m
 
 
 class GripperAction(Enum):
-    """What the gripper does before the arm moves."""
+    """What the gripper does before the arm moves.
 
-    KEEP = "keep"
-    CLOSE = "close"
-    OPEN = "open"
+    Args:
+        gap: Gap to which its fingers are told to move, m; None where they stay as they are.
+    """
+
+    KEEP = None
+    CLOSE = GAP_SHUT
+    OPEN = GAP_OPEN
+
+    def __init__(self, gap: float | None) -> None:
+        self.gap = gap

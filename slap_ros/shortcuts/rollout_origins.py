@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from slap_ros.core import ActionSpace, World
 from slap_ros.errors import SkillNotApplicableError
-from slap_ros.planning.options import OptionExecution, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
 from slap_ros.planning.search import Vertex
 from slap_ros.relational import AtomSpace, State, Target
 from slap_ros.relational.state import Array

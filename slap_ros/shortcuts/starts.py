@@ -9,20 +9,20 @@ task costs no more than the options that lead to where the shortcut begins.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from slap_ros.core import Domain
+from slap_ros.core import Domain, Task
 from slap_ros.errors import SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.graph_beyond import EdgeBeyond, add_beyond
-from slap_ros.planning.options import Option, hold_option
+from slap_ros.planning.options import hold_option
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.learner_interface import learner_interface
-from slap_ros.relational import AtomSpace, State
+from slap_ros.relational import AtomSpace, Predicate, State
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.shortcut_candidate import OperatorPath
 from slap_ros.shortcuts.signature import Change, Signature
@@ -92,6 +92,97 @@ def restore_starts(domain: Domain, records: Sequence[StartRecord]) -> list[Start
     return starts
 
 
+@dataclass(frozen=True)
+class StartGraph:
+    """The abstract graph of a task, in which shortcuts begin.
+
+    Args:
+        domain: Domain of the task.
+        seed: Seed of the task.
+        index: Index of the task.
+        task: The task.
+        problem: Operators and model over the task's objects.
+        graph: Graph of the options, from the task's initial state to its goal.
+    """
+
+    domain: Domain
+    seed: int
+    index: int
+    task: Task
+    problem: Problem
+    graph: AbstractGraph
+
+    @classmethod
+    def of_task(
+        cls, domain: Domain, seed: int, index: int, kept: KeptShortcuts = NOTHING_KEPT
+    ) -> StartGraph | None:
+        """The graph of a task; None where it cannot be solved, so that it teaches nothing.
+
+        Args:
+            domain: Domain of the task.
+            seed: Seed of the task.
+            index: Index of the task.
+            kept: Shortcuts that are options like any other.
+        """
+        task = domain.task(seed, index)
+        problem = Problem.of(domain, task.initial_state)
+        space = problem.model.space
+        try:
+            planner = kept.planner(domain, problem, task.initial_state)
+            graph = graph_of(planner, space.abstract(task.initial_state), space.mask(task.goal))
+        except SlapError:
+            return None
+        return cls(domain, seed, index, task, problem, graph)
+
+    def extend(self, signature: Signature) -> None:
+        """Add what a shortcut alone leads to, and its own edges, as planning does.
+
+        Args:
+            signature: Signature of the shortcut, for which an option stands: it is to be learned.
+        """
+        standing = hold_option(self.domain.action_space)
+        grounder = SignatureGrounder(*self._about(signature))
+        leaving = [
+            EdgeBeyond.of(i, change.apply(node), standing)
+            for i, node in enumerate(self.graph.nodes)
+            for change in grounder.changes(node)
+        ]
+        add_beyond(self.graph, leaving, self.problem.operators)
+
+    def find(
+        self,
+        signature: Signature,
+        operator_path: OperatorPath | None,
+        operator_steps: Mapping[str, float],
+        rng: np.random.Generator | None = None,
+    ) -> StartRecord | None:
+        """The start of a shortcut of this signature; None where the task has none.
+
+        Args:
+            signature: Signature of the shortcut.
+            operator_path: See :func:`find_start`.
+            operator_steps: Mean environment steps of each operator, by name.
+            rng: See :func:`find_start`.
+        """
+        matcher = SignatureMatcher(*self._about(signature))
+        to_go = steps_to_goal(self.graph, operator_steps)
+        choices = _nearest_to_goal_first(self.graph, operator_path, matcher, to_go)
+        if rng is not None:
+            choices = _shuffled([c for c in choices if to_go[c[2]] < to_go[c[1]]], rng)
+        nodes = self.graph.nodes
+        for path, i, j in choices:
+            state = _execute(self.problem, self.graph, path, self.task.initial_state)
+            if state is not None:
+                change = Change.between(nodes[i], nodes[j])
+                data = tuple(state.data)
+                return StartRecord(self.seed, self.index, data, change.add, change.delete)
+        return None
+
+    def _about(self, signature: Signature) -> tuple[Signature, AtomSpace, Collection[Predicate]]:
+        """What finds the pairs of abstract states that a signature matches."""
+        return signature, self.problem.model.space, learner_interface(self.domain).grasping
+
+
 def find_start(
     domain: Domain,
     seed: int,
@@ -124,47 +215,12 @@ def find_start(
     Returns:
         The start; None where the task has none, or cannot be solved at all.
     """
-    task = domain.task(seed, index)
-    problem = Problem.of(domain, task.initial_state)
-    space = problem.model.space
-    try:
-        planner = kept.planner(domain, problem, task.initial_state)
-        graph = graph_of(planner, space.abstract(task.initial_state), space.mask(task.goal))
-    except SlapError:  # a task that cannot be solved teaches nothing here
+    graph = StartGraph.of_task(domain, seed, index, kept)
+    if graph is None:
         return None
-    about = (signature, space, learner_interface(domain).grasping)
-    matcher = SignatureMatcher(*about)
     if beyond:
-        _extend(graph, SignatureGrounder(*about), problem, hold_option(domain.action_space))
-    to_go = steps_to_goal(graph, operator_steps)
-    choices = _nearest_to_goal_first(graph, operator_path, matcher, to_go)
-    if rng is not None:
-        choices = _shuffled([c for c in choices if to_go[c[2]] < to_go[c[1]]], rng)
-    for path, i, j in choices:
-        state = _execute(problem, graph, path, task.initial_state)
-        if state is not None:
-            change = Change.between(graph.nodes[i], graph.nodes[j])
-            return StartRecord(seed, index, tuple(state.data), change.add, change.delete)
-    return None
-
-
-def _extend(
-    graph: AbstractGraph, grounder: SignatureGrounder, problem: Problem, standing: Option
-) -> None:
-    """Add to a graph what a shortcut alone leads to, and its own edges, as planning does.
-
-    Args:
-        graph: Graph of given options.
-        grounder: Grounder of the shortcut's signature.
-        problem: Operators that may follow the shortcut.
-        standing: Option that stands for the shortcut, which is still to be learned.
-    """
-    leaving = [
-        EdgeBeyond.of(i, change.apply(node), standing)
-        for i, node in enumerate(graph.nodes)
-        for change in grounder.changes(node)
-    ]
-    add_beyond(graph, leaving, problem.operators)
+        graph.extend(signature)
+    return graph.find(signature, operator_path, operator_steps, rng)
 
 
 def _shuffled(choices: Sequence[_Choice], rng: np.random.Generator) -> list[_Choice]:

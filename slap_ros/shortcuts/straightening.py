@@ -20,7 +20,7 @@ import numpy as np
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidStateError, SkillNotApplicableError
 from slap_ros.planning.abstract_graph import Edge
-from slap_ros.planning.options import OptionExecution, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State
 from slap_ros.relational.state import Array
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder

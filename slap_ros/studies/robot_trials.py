@@ -4,33 +4,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Protocol
+from collections.abc import Callable
 
-from slap_ros.core import Domain, Task, World
+from slap_ros.core import Domain, Task
 from slap_ros.errors import SlapError
 from slap_ros.evaluation.experiment import Trial
 from slap_ros.perception import ExactPerceiver
 from slap_ros.planning.execution import EpisodeResult, Executor
-from slap_ros.planning.options import OptionResult
+from slap_ros.planning.option_execution import OptionResult
 from slap_ros.planning.planner import Planner
-from slap_ros.relational import GroundAtom, State
-
-
-class MeasuredWorld(World, Protocol):
-    """A world whose states are measured on a robot."""
-
-    def require_seen(self, goal: Iterable[GroundAtom]) -> None:
-        """Refuse a goal about what is not seen when the task begins.
-
-        Raises:
-            NoDetectionError: It is about such an object.
-        """
-        ...
-
-    def close(self) -> None:
-        """Release what the world uses."""
-        ...
+from slap_ros.relational import State
+from slap_ros.robot.measured_world import MeasuredWorld
 
 
 def solve_on_robot(

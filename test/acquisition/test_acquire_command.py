@@ -27,7 +27,7 @@ BUDGET = [*(word for change in SMALL for word in ("--set", change)), "--steps", 
 
 @pytest.mark.slow
 @pytest.mark.training
-def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
+def test_a_library_is_acquired_shown_and_begun_with(tmp_path, in_this_process):
     made = slap("acquire", "points", "--output", tmp_path / "one", "--json", *BUDGET)
     assert made.exit_code == 0, made.stderr
     record = json.loads(made.stdout)

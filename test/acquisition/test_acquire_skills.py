@@ -106,7 +106,7 @@ def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path
     skills = ["--skills", write_library(tmp_path / "some", PICKING)]
     ran = slap(
         "run", "points", "--acquire", "--goal", "swapped", "--record", bag, *skills, "--json",
-        "--patience", "10",
+        "--patience", "10", "--in-process",
         "--acquisition", f"output={tmp_path / 'skills'},steps=30000,changes={changes}",
     )  # fmt: skip
     assert ran.returncode == 0, ran.stderr

@@ -96,7 +96,7 @@ def test_one_bag_has_the_proposal_the_skills_and_the_plan_that_a_shortcut_makes_
     run = subprocess.run(
         [
             sys.executable, "-m", "ensemble.cli", "run", "points", "--preset", "line",
-            "--skills", skills, "--grow", "--patience", "5",
+            "--skills", skills, "--grow", "--patience", "5", "--in-process",
             "--acquisition", ",".join(f"{name}={value}" for name, value in given.items()),
             "--record", bag, "--json",
         ],

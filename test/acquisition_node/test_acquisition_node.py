@@ -15,7 +15,7 @@ from slap_msgs.action import ProposeOperators
 from slap_msgs.msg import AcquisitionEvent, GroundAtom
 
 from ensemble.interfaces import ACQUISITION_EVENTS, CLOSE_BAG, PROPOSE_OPERATORS
-from ensemble.launcher import ProcessLauncher
+from ensemble.launcher import InProcessLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.bags.reader import read_bag
@@ -70,9 +70,13 @@ def _no_settings_of_this_machine(monkeypatch):
 def asking(record=None, **parameters):
     """A simulator, the acquisition node and whoever asks it."""
     settings = RunSettings(DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", record)
-    every = node_parameters(settings) | {"acquisition_node": parameters}
-    nodes = {k: every[k] for k in ("sim_node", "acquisition_node", "recorder_node") if k in every}
-    with ProcessLauncher(nodes), temporary_node(Asker) as (asker, spinner):
+    every = node_parameters(settings)
+    beside = {name: every[name] for name in ("sim_node", "recorder_node") if name in every}
+    with (
+        ProcessLauncher({"acquisition_node": parameters}),
+        temporary_node(Asker) as (asker, spinner),
+        InProcessLauncher(beside, spinner.executor),
+    ):
         assert spinner.spin_until(asker.client.server_is_ready, LIMIT)
         assert spinner.spin_until(lambda: asker.hearing.get_publisher_count() > 0, LIMIT)
         yield asker, spinner

@@ -19,7 +19,8 @@ from slap_ros.motion.inverse_kinematics import inverse_kinematics
 from slap_ros.motion.joints import control_steps
 from slap_ros.motion.linear import linear_motion, shifted
 from slap_ros.planning.execution import EpisodeResult, PlanExecution
-from slap_ros.planning.options import OptionResult, hold_option
+from slap_ros.planning.option_execution import OptionResult
+from slap_ros.planning.options import hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.relational import Target
 from slap_ros.skills.domain_choice import DomainChoice, open_domain

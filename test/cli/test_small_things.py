@@ -30,10 +30,13 @@ def test_a_seed_that_nobody_gave_is_said_beside_json(command, network):
     assert first == second
 
 
+ONE_TASK = ["--tasks", "1", "--seeds", "1", "--shortcuts", "none"]
+
+
 @pytest.mark.parametrize(
     ("command", "file"),
     [
-        (["evaluate", "obstacle2d", "--tasks", "1", "--seeds", "1"], "trials.json"),
+        (["evaluate", "obstacle2d", *ONE_TASK], "trials.json"),
         (["bag", "render", str(BAG)], "run.gif"),
         (["report", str(BAG)], "run.html"),
     ],

@@ -51,7 +51,7 @@ def test_the_steps_are_taken_in_the_thick_of_it(recorded):
     assert (np.abs(lag).max(0) > 0.01).mean() > 0.03  # something stops the hand
 
 
-@pytest.mark.parametrize("order", ["backwards", *slow("forwards", 0, 1, 2)])
+@pytest.mark.parametrize("order", ["backwards", *slow("forwards", 0)])
 def test_the_same_in_any_order(recorded, world, order):
     steps = {"forwards": range(COUNT), "backwards": range(COUNT - 1, -1, -1)}.get(order)
     if steps is None:

@@ -12,7 +12,8 @@ from slap_ros.domains.disturbed.generator import GENERATOR
 from slap_ros.domains.obstacle_tower.features import BLOCK
 from slap_ros.errors import InvalidCommandError, InvalidParameterError, InvalidStateError
 from slap_ros.planning.model import Model
-from slap_ros.planning.options import OptionExecution, given_option
+from slap_ros.planning.option_execution import OptionExecution
+from slap_ros.planning.options import given_option
 from slap_ros.relational import State
 from slap_ros.robot.usable_domains import require_robot
 

@@ -164,7 +164,7 @@ def test_with_noise_the_ensemble_errs_as_an_experiment_does(network, tmp_path, s
 
 
 def test_planning_goes_on_while_the_robot_moves_as_in_an_experiment(network, tmp_path):
-    choice = DomainChoice("obstacle_tower", "fair:obstacles=5")
+    choice = DomainChoice("obstacle_tower", "fair:obstacles=4")
     settings = RunSettings(
         choice, 302, 0, "anytime", tmp_path / "bag", shortcuts="none", patience=PATIENCE
     )

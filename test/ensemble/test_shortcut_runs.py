@@ -28,7 +28,8 @@ from slap_ros.errors import InvalidLibraryError, SkillNotApplicableError, Unknow
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.planning.model import Model
-from slap_ros.planning.options import OptionExecution, OptionKind
+from slap_ros.planning.option_execution import OptionExecution
+from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import PlanEdge
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target

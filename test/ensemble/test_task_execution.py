@@ -12,7 +12,8 @@ from planner_node.run_statistics import RunStatistics
 from planner_node.task_execution import TaskExecution
 from slap_ros.domains import get_domain
 from slap_ros.errors import EpisodeChangedError, ErrorCode
-from slap_ros.planning.options import OptionResult, hold_option
+from slap_ros.planning.option_execution import OptionResult
+from slap_ros.planning.options import hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 
 DOMAIN = get_domain("obstacle2d")

@@ -17,7 +17,8 @@ from slap_ros.planning.effort import Effort
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.model import Model, Rollout
-from slap_ros.planning.options import Option, OptionKind, OptionResult
+from slap_ros.planning.option_execution import OptionResult
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import Feature, GroundOperator, Layout, State, Type
 from slap_ros.signals import TerminatedError, exit_code

@@ -15,7 +15,8 @@ from slap_ros.errors import ErrorCode
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Rollout
-from slap_ros.planning.options import Option, OptionExecution, OptionKind, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import ground_options
 from slap_ros.planning.search import search_exhaustively

@@ -297,10 +297,13 @@ def test_a_reset_forgets_commands_that_have_not_been_executed(network):
         bench.until(lambda: bench.joints[-1][0] == pytest.approx(before + 0.06, abs=1e-3))
 
 
-@pytest.mark.parametrize("goal", ["(Holding robot block4)", *slow("")])
-def test_the_ensemble_solves_a_task_by_horizons(network, tmp_path, goal):
-    bag = tmp_path / "bag"
+@pytest.mark.parametrize(
+    ("preset", "goal"), [("fair", "(Holding robot block4)"), *slow((SMALL, ""))]
+)
+def test_the_ensemble_solves_a_task_by_horizons(network, tmp_path, preset, goal):
+    bag, domain = tmp_path / "bag", DomainChoice("obstacle_tower", preset)
     chosen = settings(EXACT, PATIENT | {"horizon": 3}, bag, goal=goal)  # no plan diverges
+    chosen = replace(chosen, domain=domain)
     metrics = run(RunRequest(chosen, timeout_s=600, in_process=True), lambda *_: None)
     assert metrics.success, metrics.error_msg
     assert metrics.replans == 0

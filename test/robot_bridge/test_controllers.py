@@ -19,10 +19,11 @@ from ensemble.robot_parameters import (
     finger_joints,
 )
 from ensemble.spinner import temporary_node
-from robot_bridge.robot import GAP_OPEN, GAP_SHUT, Robot
+from robot_bridge.robot import Robot
 from robot_bridge.simulated.waiting import pause
 from slap_ros.domains import get_domain
 from slap_ros.errors import ControllerAbortedError
+from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 
 LIMIT = 60.0  # s, far more than anything here takes

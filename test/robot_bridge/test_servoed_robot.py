@@ -19,7 +19,6 @@ from slap_ros.errors import (
 from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import Workspace
 from slap_ros.robot.scene_config import sampled_scene_config
@@ -73,9 +72,8 @@ class MeasuredPlant:
 
     def step(self, action):
         command = self.robot.plan_command(action)
-        if command.gripper is not GripperAction.KEEP:
-            closes = command.gripper is GripperAction.CLOSE
-            self._controllers.command_fingers(GAP_SHUT if closes else GAP_OPEN)
+        if (gap := command.gripper.gap) is not None:
+            self._controllers.command_fingers(gap)
         self._controllers.replace_motion(command.points)
         for _ in range(round(0.05 / PERIOD_S)):
             self._controllers.pass_period()

@@ -11,6 +11,8 @@ from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.approach import DISTANCE
 from slap_ros.domains.benchtop.state_access import hand_position, held_thing
 from slap_ros.domains.stack_at_target.scenery import CUBE_HALF
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.approaches import APPROACHED, MOST_STEPS, Approacher, sides_of
 from slap_ros.shortcuts.demonstrations import demonstrate
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
@@ -25,9 +27,11 @@ SEED = 300  # of tasks for development
 PUSH = 25  # environment steps
 
 
-def explore(domain, settings):
-    explorer = Explorer.of_task(domain, SEED, 0, settings, np.random.default_rng(SEED))
-    return explorer.explore()
+def explore(domain, settings, planned=None):
+    """What is found in a task, which is planned for first unless it was."""
+    if planned is None:
+        return Explorer.of_task(domain, SEED, 0, settings, np.random.default_rng(SEED)).explore()
+    return Explorer(domain, *planned, settings, np.random.default_rng(SEED)).explore()
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +45,17 @@ def settings(coffee):
 
 
 @pytest.fixture(scope="module")
-def found(coffee, settings):
-    return explore(coffee, settings)
+def planned(coffee):
+    """A task with its plan. What is executed in its model is executed once."""
+    task = coffee.task(SEED)
+    problem = Problem.of(coffee, task.initial_state)
+    goal = problem.model.space.mask(task.goal)
+    return problem, task, GraphPlanner(problem).plan(task.initial_state, goal).plan
+
+
+@pytest.fixture(scope="module")
+def found(coffee, settings, planned):
+    return explore(coffee, settings, planned)
 
 
 @pytest.fixture(scope="module")
@@ -60,13 +73,13 @@ def test_a_drawer_is_shut_with_the_pod_in_the_hand_which_no_operator_says(candid
     assert ShortcutCandidate.from_json(candidate.as_json()) == candidate
 
 
-def test_without_the_approach_it_is_not_found(coffee, settings):
-    assert not explore(coffee, replace(settings, approaches=0)).candidates
+def test_without_the_approach_it_is_not_found(coffee, settings, planned):
+    assert not explore(coffee, replace(settings, approaches=0), planned).candidates
 
 
-def test_a_budget_is_kept_by_approaches_too(coffee, settings, found):
+def test_a_budget_is_kept_by_approaches_too(coffee, settings, planned, found):
     budget = found.environment_steps // 2
-    assert explore(coffee, replace(settings, budget=budget)).environment_steps <= budget
+    assert explore(coffee, replace(settings, budget=budget), planned).environment_steps <= budget
 
 
 def test_steps_of_approaches_are_counted_before_they_are_taken(coffee, settings, found):

@@ -3,7 +3,7 @@
 """Terms are left out as they are named, and a study that is killed goes on where it was."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import pytest
 
@@ -11,6 +11,7 @@ from slap_ros.domains import domain_names, get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import learning_attempt
+from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.studies.slap import ablation
 from support.slap_command import slap
 
@@ -79,6 +80,11 @@ def test_a_study_that_was_killed_goes_on(tmp_path, monkeypatch):
         learned.append(attempt.distribution.domain.term)
         return learn(attempt, **options)
 
+    def few(name, domain):
+        own = training_settings(name, domain)
+        return replace(own, exploration=replace(own.exploration, tasks=3), starts=30)
+
+    monkeypatch.setattr(ablation, "training_settings", few)
     terms = ["--term", ablation.NOTHING, "--term", PLAIN]
     with monkeypatch.context() as patch:
         patch.setattr(learning_attempt, "learn", killed)

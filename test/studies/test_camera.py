@@ -18,7 +18,8 @@ pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")
 pytest.importorskip("pupil_apriltags")
 
-SMALL = ["--preset", "fair:obstacles=1,distractors=0", "--tasks", "1", "--seeds", "1"]
+# A block on the table and a free target: the shortest plans that there are.
+SMALL = ["--preset", "fair:obstacles=0,distractors=0", "--tasks", "1", "--seeds", "1"]
 SMALL += ["--first-seed", "1", "--samples", "1"]
 
 
@@ -26,11 +27,12 @@ def study(output):
     return slap("study", "camera", "obstacle_tower", "--output", output, *SMALL)
 
 
-@pytest.mark.parametrize("seed, code", [(306, ErrorCode.NO_DETECTION), (454, ErrorCode.NONE)])
-def test_a_block_that_no_picture_shows_matters_only_to_a_task_about_it(seed, code):
-    choice = DomainChoice("obstacle_tower", "fair:obstacles=1,distractors=4")
+@pytest.mark.parametrize("obstacles, code", [(1, ErrorCode.NO_DETECTION), (0, ErrorCode.NONE)])
+def test_a_block_that_no_picture_shows_matters_only_to_a_task_about_it(obstacles, code):
+    """Without obstacles, another block is to be placed than the one that stands behind others."""
+    choice = DomainChoice("obstacle_tower", f"fair:obstacles={obstacles},distractors=4")
     setup = PlanningSetup(choice, "lazy", PURE_PLANNING)
-    trial = solve_by_camera(setup, seed, 0)  # a block stands behind others
+    trial = solve_by_camera(setup, 306, 0)
     assert trial.error_code == code, trial.reason
     assert trial.success == (code is ErrorCode.NONE)
     assert ("about what no picture has shown yet: block1" in trial.reason) != trial.success

@@ -20,9 +20,8 @@ FOLDER = Path(__file__).parent
 LIBRARY = FOLDER.parent / "shortcuts" / "data" / "obstacle2d"
 DONE = 3  # jobs, before a study is killed
 PLANNING = ["--shortcuts", str(LIBRARY), "--samples", "2"]
-STUDIES = {
+STUDIES = {  # one for each kind of result, which is read again
     "table1": ["--library", str(LIBRARY), "--samples", "2", "--preset", "fair", "--tasks", "2"],
-    "generalisation": ["--tasks", "1", "--seeds", "2", *PLANNING, "--vary", "bystanders=0,1"],
     "goals": ["--goals", "3", "--seeds", "1", *PLANNING],
     "perception": ["--tasks", "1", "--seeds", "1", *PLANNING],
     "planning_time": ["--tasks", "1", "--seeds", "2", *PLANNING, "--vary", "bystanders=0,1"],

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from slap_ros.errors import ErrorCode
-from slap_ros.studies.lg_sail.domain_choices import shipped_skills
-from slap_ros.studies.lg_sail.open_loop import OpenLoopTrial, PlayedSkills
+from slap_ros.studies.lg_sail.domain_choices import shipped_skills, with_demonstrator
+from slap_ros.studies.lg_sail.open_loop import OpenLoopTrial, PlayedSkills, play_task
 from support.slap_command import slap
 
 pytest.importorskip("pybullet")
@@ -61,15 +61,9 @@ def test_what_the_library_that_ships_stacks_is_stacked_in_mujoco(tmp_path):
 
 @pytest.mark.slow  # more of what the test above shows: with a drawer and a lid
 @pytest.mark.timeout(180)
-def test_plans_with_a_drawer_and_a_lid_are_played(tmp_path):
-    (library, *_) = shipped_skills("make_coffee")
-    done = study("make_coffee", tmp_path, "--library", str(library))
-    assert done.exit_code == 0, done.stderr
-    data = json.loads((tmp_path / "open_loop_make_coffee.json").read_text())
-    shown = data["found"]["rows"][-1]
-    (trial,) = shown["trials"]
-    assert shown["skills"] == "demonstrator"
-    assert trial["planned"]
-    assert "IsCabinetClose" not in trial["reason"]  # opened and closed in MuJoCo
-    assert 0.0 < trial["off_m"]["pod"] < 0.02
-    assert [grasp["closed"] for grasp in trial["grasps"]] == [True, False]
+def test_plans_with_a_drawer_and_a_lid_are_played():
+    trial = play_task(with_demonstrator("make_coffee", None), "training", 300, 0)
+    assert trial.planned
+    assert "IsCabinetClose" not in trial.reason  # opened and closed in MuJoCo
+    assert 0.0 < trial.off_m["pod"] < 0.02
+    assert [grasp["closed"] for grasp in trial.grasps] == [True, False]

@@ -13,6 +13,7 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.candidate_groups import problem_key
 from slap_ros.shortcuts.named_settings import training_settings
+from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.slap.drawn_candidates import (
     LearningProblem,
@@ -20,6 +21,7 @@ from slap_ros.studies.slap.drawn_candidates import (
     candidates_of_task,
     learn_candidate,
     problems_of,
+    starts_in_task,
 )
 from support.slap_command import slap
 
@@ -55,13 +57,25 @@ def test_of_each_task_as_many_are_drawn_as_is_its_share(explored):
     assert drawn == problems_of([explored, small], 20)
 
 
+def starts_of(problems, steps, tasks):
+    """For each of the problems, its starts in the tasks, as records."""
+    candidates = [one.candidate for one in problems]
+    found = [starts_in_task(TRAINING, i, candidates, steps) for i in tasks]
+    return [[StartRecord.from_json(one) for one in own if one] for own in zip(*found, strict=True)]
+
+
 def test_a_candidate_begins_where_its_operators_lead(explored):
     steps = explored.explored.operator_steps
-    tasks = range(3)
-    for problem in problems_of([explored], 10):
-        one = problem.candidate
-        starts = [jobs.start(TRAINING, i, one.signature, one.operator_path, steps) for i in tasks]
-        assert any(starts), one
+    problems = problems_of([explored], 10)
+    assert all(starts_of(problems, steps, range(3)))
+
+
+def test_a_candidate_begins_among_others_where_it_begins_alone(explored):
+    steps = explored.explored.operator_steps
+    candidates = [one.candidate for one in problems_of([explored], 10)]
+    alone = [jobs.start(TRAINING, 2, one.signature, one.operator_path, steps) for one in candidates]
+    assert any(alone) and len({str(one) for one in alone}) > 1
+    assert starts_in_task(TRAINING, 2, candidates, steps) == alone
 
 
 @pytest.mark.slow
@@ -75,8 +89,8 @@ def test_what_rollouts_join_can_be_learned_and_shortens_plans(explored):
     assert isinstance(problem, LearningProblem) and not problem.pruned
     settings = replace(SETTINGS, starts=50).with_total_steps(30_000)
     plain = {i: jobs.plan_length(TRAINING, i, (), settings.sampling) for i in range(6)}
-    steps = explored.explored.operator_steps
-    learned = learn_candidate(TRAINING, problem.candidate, steps, settings, plain)
+    (starts,) = starts_of([problem], explored.explored.operator_steps, range(50))
+    learned = learn_candidate(TRAINING, problem.candidate.signature, tuple(starts), settings, plain)
     assert learned.success > 0.5 and learned.relative < 1.0
 
 

@@ -18,11 +18,12 @@ from ensemble.interfaces import (
     SKILLS,
     SOLVE_TASK,
 )
-from ensemble.launcher import ProcessLauncher
+from ensemble.launcher import InProcessLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.skills.domain_choice import DomainChoice
 
+ALONE = ("acquisition_node", "planner_node")
 LIMIT = 120.0  # s
 GROWTH_LIMIT = 400.0  # s, for two rounds, each of which starts processes that import torch
 # Both skills of `points` are learned with these in seconds.
@@ -62,13 +63,21 @@ class Asker(Node):
 def asking(record=None, names=("sim_node", "acquisition_node"), settings=SETTINGS, **parameters):
     """The nodes that are named, the recorder where there is a bag, and whoever asks them.
 
+    Those that a test may kill are processes; the others share the process of whoever asks.
+
     Yields:
-        Who asks, what spins it, and the nodes' launcher.
+        Who asks, what spins it, and the processes' launcher.
     """
     every = node_parameters(replace(settings, record=record, acquisition=parameters))
     every |= {"acquisition_node": parameters | {"libraries": parameters.get("output", "")}}
-    nodes = {name: every[name] for name in (*names, *(("recorder_node",) if record else ()))}
-    with ProcessLauncher(nodes) as launcher, temporary_node(Asker) as (asker, spinner):
+    names = (*names, *(("recorder_node",) if record else ()))
+    alone = {name: every[name] for name in names if name in ALONE}
+    beside = {name: every[name] for name in names if name not in ALONE}
+    with (
+        ProcessLauncher(alone) as launcher,
+        temporary_node(Asker) as (asker, spinner),
+        InProcessLauncher(beside, spinner.executor),
+    ):
         for client in (asker.client, asker.grower):
             assert spinner.spin_until(client.server_is_ready, LIMIT)
         yield asker, spinner, launcher

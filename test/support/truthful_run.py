@@ -21,7 +21,8 @@ from slap_ros.messages.typestore import typestore
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Model
-from slap_ros.planning.options import OptionExecution, OptionResult, given_option
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
+from slap_ros.planning.options import given_option
 
 METADATA = {"seed": "7", "preset": "fair", "revision": "0123456789ab-dirty"}
 TICK = 1_000_003  # ns between any two messages

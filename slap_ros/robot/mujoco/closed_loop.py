@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 from slap_ros.core import Action, Domain
 from slap_ros.errors import InvalidStateError, NoDetectionError
 from slap_ros.relational import GroundAtom, State
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
+from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Limits
+from slap_ros.robot.measured_world import MeasuredWorld
 from slap_ros.robot.mujoco.arm import FINGER_FORCE, PERIOD_S
 from slap_ros.robot.mujoco.detectors import ExactDetector, ObjectDetector
 from slap_ros.robot.mujoco.plant_controllers import REACH, TOLERANCES, PlantControllers
@@ -53,8 +54,8 @@ def camera_settings() -> ClosedLoopSettings:
     return ClosedLoopSettings(tracking=tracking, settle_time_s=4.0, detection_timeout_s=8.0)
 
 
-class ClosedLoopWorld:
-    """A world whose states are measured on a plant of its own.
+class ClosedLoopWorld(MeasuredWorld):
+    """A world whose states are measured once everything has come to rest.
 
     Args:
         domain: Domain with a Panda.
@@ -84,19 +85,6 @@ class ClosedLoopWorld:
         self._detected_s = self.plant.time_s
         self._state = self._measured(self.plant.time_s, self._robot.measure_first)
 
-    @property
-    def state(self) -> State:
-        """The state that was measured last."""
-        return self._state
-
-    def reset(self, state: State) -> None:  # noqa: ARG002
-        """Refuse: objects of a robot are arranged by hand.
-
-        Raises:
-            InvalidStateError: Always.
-        """
-        raise InvalidStateError("a robot cannot be put into a state")
-
     def step(self, action: Action) -> State:
         """Act, wait until everything is at rest, and measure.
 
@@ -124,13 +112,13 @@ class ClosedLoopWorld:
 
     def _actuate(self, action: GripperAction) -> None:
         """As the bridge does: what closes around nothing is opened again."""
-        if action is GripperAction.CLOSE:
-            self._controllers.move_fingers(GAP_SHUT)
-            if self._robot.confirm_grasp(self.plant.gap):
-                return
-        if action is not GripperAction.KEEP:
-            self._controllers.move_fingers(GAP_OPEN)
+        if action.gap is None:
+            return
+        self._controllers.move_fingers(action.gap)
+        if action is GripperAction.OPEN:
             self._robot.confirm_release()
+        elif not self._robot.confirm_grasp(self.plant.gap):
+            self._actuate(GripperAction.OPEN)
 
     def _measured(self, since_s: float, measure: Callable[[float, bool], State | None]) -> State:
         """The state since a time, s, once it is known."""

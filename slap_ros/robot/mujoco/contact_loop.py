@@ -14,9 +14,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from slap_ros.core import Action, Domain
-from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import GroundAtom, State
-from slap_ros.robot.gripper import GAP_OPEN, GAP_SHUT, GripperAction
+from slap_ros.robot.measured_world import MeasuredWorld
 from slap_ros.robot.mujoco.arm import JOINT_POSITIONS, PERIOD_S, ArmControl
 from slap_ros.robot.mujoco.contact_state import measured_state
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
@@ -30,7 +30,7 @@ from slap_ros.worlds.contact.snapshot import ContactIndex
 PERIODS = round(CONTROL_PERIOD_S / PERIOD_S)  # of the plant in a control period
 
 
-class ContactLoopWorld:
+class ContactLoopWorld(MeasuredWorld):
     """A world of a hand that acts by forces, whose states are measured on a plant of its own.
 
     Args:
@@ -59,19 +59,6 @@ class ContactLoopWorld:
         self._controllers = PlantControllers(self.plant, UNCHECKED, scene.hand.grip_n)
         self._state = self._measured(initial)
 
-    @property
-    def state(self) -> State:
-        """The state that was measured last."""
-        return self._state
-
-    def reset(self, state: State) -> None:  # noqa: ARG002
-        """Refuse: objects of a robot are arranged by hand.
-
-        Raises:
-            InvalidStateError: Always.
-        """
-        raise InvalidStateError("a robot cannot be put into a state")
-
     def step(self, action: Action) -> State:
         """Act for one control period, and measure.
 
@@ -79,9 +66,8 @@ class ContactLoopWorld:
             InvalidCommandError: The action is not in the action space; nothing moved.
         """
         command = self._servo.act(self._state, action)
-        if command.gripper is not GripperAction.KEEP:
-            closes = command.gripper is GripperAction.CLOSE
-            self._controllers.command_fingers(GAP_SHUT if closes else GAP_OPEN)
+        if (gap := command.gripper.gap) is not None:
+            self._controllers.command_fingers(gap)
         self._controllers.replace_motion(self._control.replacing(command.points))
         for _ in range(PERIODS):
             self._controllers.pass_period()

@@ -23,7 +23,7 @@ from slap_ros.shortcuts.progress import latest
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
 from slap_ros.shortcuts.shortcut_candidate import OperatorPath
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.starts import StartRecord, shortest_paths
+from slap_ros.shortcuts.starts import StartGraph, StartRecord, shortest_paths
 
 DRAWING = 20_000  # sets the random numbers that draw candidates apart from those of a training
 
@@ -142,10 +142,36 @@ class LearnedCandidate:
     relative: float | None
 
 
+def starts_in_task(
+    distribution: TaskDistribution,
+    index: int,
+    candidates: Sequence[DrawnCandidate],
+    operator_steps: Mapping[str, float],
+) -> list[dict[str, Any] | None]:
+    """Where each candidate begins in a task, all in one graph.
+
+    Args:
+        distribution: Distribution of the tasks.
+        index: Index of the task among those that starts are collected from, from 0.
+        candidates: Candidates to begin.
+        operator_steps: Mean environment steps of each operator, by name.
+
+    Returns:
+        For each candidate a :class:`~slap_ros.shortcuts.starts.StartRecord` as JSON; None where
+        there is no start.
+    """
+    index = training_jobs.STARTS.index(index)
+    graph = StartGraph.of_task(distribution.make_domain(), distribution.task_seed, index)
+    if graph is None:
+        return [None] * len(candidates)
+    found = (graph.find(one.signature, one.operator_path, operator_steps) for one in candidates)
+    return [None if one is None else one.as_json() for one in found]
+
+
 def learn_candidate(
     distribution: TaskDistribution,
-    candidate: DrawnCandidate,
-    operator_steps: Mapping[str, float],
+    signature: Signature,
+    starts: tuple[StartRecord, ...],
     settings: TrainingSettings,
     plain: Mapping[int, int],
 ) -> LearnedCandidate:
@@ -153,19 +179,18 @@ def learn_candidate(
 
     Args:
         distribution: Distribution of the tasks.
-        candidate: Candidate to learn.
-        operator_steps: Mean environment steps of each operator, by name.
+        signature: Signature of the candidate.
+        starts: Where it begins, each in a task of its own.
         settings: Settings of the training.
         plain: Environment steps of the plans of validation tasks without it, by the task's index.
 
     Returns:
         What came of it; nothing learned where it can begin nowhere.
     """
-    starts = tuple(_starts(distribution, candidate, operator_steps, settings.starts))
     if not starts:
         return LearnedCandidate(0, 0.0, None)
     with TemporaryDirectory() as folder:
-        attempt = LearningAttempt(distribution, candidate.signature, starts, settings, folder)
+        attempt = LearningAttempt(distribution, signature, starts, settings, folder)
         shortcut = learn(attempt, processes=1)
         success = latest(attempt.work)[len(settings.stages) - 1].success
     if success < ENOUGH_SUCCESS:
@@ -176,20 +201,6 @@ def learn_candidate(
     }
     relative = [length / plain[i] for i, length in planned.items() if isinstance(length, int)]
     return LearnedCandidate(len(starts), success, fmean(relative) if relative else None)
-
-
-def _starts(
-    distribution: TaskDistribution,
-    candidate: DrawnCandidate,
-    operator_steps: Mapping[str, float],
-    tasks: int,
-) -> Iterator[StartRecord]:
-    for i in range(tasks):
-        found = training_jobs.start(
-            distribution, i, candidate.signature, candidate.operator_path, operator_steps
-        )
-        if found is not None:
-            yield StartRecord.from_json(found)
 
 
 @dataclass(frozen=True)

@@ -18,18 +18,21 @@ from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.exploration_result import mean_operator_steps
 from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
+from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import RESULTS, Output
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.drawn_candidates import (
+    DrawnCandidate,
     LearnedCandidate,
     LearningProblem,
     TaskCandidates,
     candidates_of_task,
     learn_candidate,
     problems_of,
+    starts_in_task,
 )
 from slap_ros.studies.slap.explored_tasks import explore_tasks
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study
@@ -196,6 +199,24 @@ def _plan_without(
     return {indices[name]: one for name, one in results.items() if not isinstance(one, str)}
 
 
+def _starts(
+    candidates: Sequence[DrawnCandidate],
+    operator_steps: Mapping[str, float],
+    distribution: TaskDistribution,
+    tasks: int,
+    runner: JobRunner,
+) -> list[tuple[StartRecord, ...]]:
+    """Where each candidate begins: at most once in each task."""
+    found = runner.run(
+        "collecting starts",
+        starts_in_task,
+        lambda data: [None if one is None else StartRecord.from_json(one) for one in data],
+        {f"starts {i}": (distribution, i, candidates, operator_steps) for i in range(tasks)},
+    )
+    by_candidate = zip(*found.values(), strict=True)
+    return [tuple(one for one in starts if one is not None) for starts in by_candidate]
+
+
 def _learn(
     problems: Sequence[LearningProblem],
     explored: Sequence[TaskCandidates],
@@ -205,14 +226,16 @@ def _learn(
     runner: JobRunner,
 ) -> list[PrunedRow]:
     """Learn each of them once."""
+    candidates = [one.candidate for one in problems]
     operator_steps = mean_operator_steps([task.explored for task in explored])
+    starts = _starts(candidates, operator_steps, distribution, settings.starts, runner)
     results = runner.run(
         "learning",
         learn_candidate,
         lambda data: LearnedCandidate(**data),
         {
-            f"candidate {i}": (distribution, one.candidate, operator_steps, settings, plain)
-            for i, one in enumerate(problems)
+            f"candidate {i}": (distribution, one.signature, own, settings, plain)
+            for i, (one, own) in enumerate(zip(candidates, starts, strict=True))
         },
     )
     return [PrunedRow(one, own) for one, own in zip(problems, results.values(), strict=True)]

@@ -18,13 +18,14 @@ from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.experiment import Trial
 from slap_ros.evaluation.summary import Summary, format_spread
 from slap_ros.relational import State
+from slap_ros.robot.measured_world import MeasuredWorld
 from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.skills.domain_choice import open_domain
 from slap_ros.studies.comparison import ApproachResult, Comparison, PlanningSetup, named_tasks
 from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.robot_trials import MeasuredWorld, solve_on_robot
+from slap_ros.studies.robot_trials import solve_on_robot
 from slap_ros.studies.study import PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:

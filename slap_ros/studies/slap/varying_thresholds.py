@@ -19,7 +19,7 @@ import numpy as np
 
 from slap_ros.core import Action, Domain, Task
 from slap_ros.errors import PlanningLimitError, SkillNotApplicableError, UnsolvableError
-from slap_ros.planning.options import OptionExecution, OptionResult
+from slap_ros.planning.option_execution import OptionExecution, OptionResult
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import AtomSpace, State
