@@ -92,7 +92,21 @@ def compiled(function: Function) -> Function:
         before, _config.CACHE_DIR = _config.CACHE_DIR, str(folder)
         made.enable_caching()
         _config.CACHE_DIR = before
+        _spare(made._cache)
     return cast(Function, made)
+
+
+def _spare(machine_code: Any) -> None:
+    """Let a function run whose machine code cannot be kept: a full disk must not end a run."""
+    save = machine_code.save_overload
+
+    def save_or_say(signature: object, code: object) -> None:
+        try:
+            save(signature, code)
+        except OSError as error:
+            logger.warning("machine code is not kept, and compiled again next time: %s", error)
+
+    machine_code.save_overload = save_or_say
 
 
 def is_compiled() -> bool:
