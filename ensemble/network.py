@@ -21,6 +21,7 @@ from ensemble.loopback import loopback_only
 from ensemble.startup import leave_quietly
 from slap_ros.doctor import settings
 from slap_ros.errors import InvalidParameterError
+from slap_ros.signals import raise_after_imports
 
 DISCOVERY_RANGE = settings.RANGE
 CYCLONE = "rmw_cyclonedds_cpp"
@@ -53,7 +54,7 @@ def join_network(**options: Any) -> None:
         raise InvalidParameterError(f"{fault.found}. {fault.advice}")
     os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
     if signal.getsignal(signal.SIGINT) is leave_quietly:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
+        signal.signal(signal.SIGINT, raise_after_imports)  # for rclpy to go on with
     try:
         rclpy.init(**options)
     except (RCLError, UnknownROSArgsError) as error:

@@ -70,7 +70,7 @@ def signals_raised() -> Iterator[None]:
     """
     ours = [number for number in WORDS if signal.getsignal(number) is _exit_at_once]
     for number in ours:
-        signal.signal(number, _raise)
+        signal.signal(number, raise_after_imports)
     try:
         with interrupts_in_destructors(_send_again):
             yield
@@ -114,7 +114,7 @@ def signals_held_back() -> Iterator[None]:
     """
     arrived: list[int] = []
     main = threading.current_thread() is threading.main_thread()  # no other is ever interrupted
-    ours = [number for number in WORDS if main and signal.getsignal(number) is _raise]
+    ours = [number for number in WORDS if main and signal.getsignal(number) is raise_after_imports]
     for number in ours:
         signal.signal(number, lambda number, _: arrived.append(number))
     # The mask is inherited. It alone holds nothing back: another thread may take the signal, and
@@ -125,7 +125,7 @@ def signals_held_back() -> Iterator[None]:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         for number in ours:
-            signal.signal(number, _raise)
+            signal.signal(number, raise_after_imports)
         if arrived:
             signal.raise_signal(arrived[0])
 
@@ -158,7 +158,19 @@ def _exit_at_once(number: int, _: FrameType | None) -> None:
     os._exit(128 + number)
 
 
-def _raise(number: int, frame: FrameType | None) -> None:
+def raise_after_imports(number: int, frame: FrameType | None) -> None:
+    """Raise a signal's error; later, where a module is being imported.
+
+    A compiled one that imports others prints what is raised meanwhile and goes on, or drops it.
+
+    Args:
+        number: The signal's.
+        frame: What is executed.
+
+    Raises:
+        KeyboardInterrupt: It is SIGINT.
+        TerminatedError: It is SIGTERM.
+    """
     error = TerminatedError() if number == signal.SIGTERM else KeyboardInterrupt()
     if not _importing(frame):
         raise error
@@ -166,7 +178,7 @@ def _raise(number: int, frame: FrameType | None) -> None:
 
 
 def _importing(frame: FrameType | None) -> bool:
-    """Whether a module is being imported: compiled ones may drop what is raised meanwhile."""
+    """Whether a module is being imported."""
     while frame is not None:
         if frame.f_code.co_filename == IMPORTING:
             return True

@@ -208,6 +208,44 @@ def test_ctrl_c_in_a_destructor_ends_a_node_without_a_word(network):
     assert "KeyboardInterrupt" not in process.stdout + process.stderr
 
 
+INTERRUPTED_IMPORT = """
+import sys
+from ensemble.entry_point import run_node
+
+def make():
+    import interrupted
+    from rclpy.node import Node
+    return Node("late")
+
+def main():
+    return run_node("late", make)
+"""
+INTERRUPTED = """
+import os, signal
+from pathlib import Path
+os.kill(os.getpid(), signal.SIGINT)
+Path(__file__).with_suffix(".done").touch()
+"""
+
+
+def test_ctrl_c_waits_for_a_module_that_a_node_imports(network, tmp_path):
+    """What is raised meanwhile is printed by compiled ones, which go on."""
+    (tmp_path / "late").mkdir()
+    (tmp_path / "late" / "node.py").write_text(INTERRUPTED_IMPORT)
+    (tmp_path / "interrupted.py").write_text(INTERRUPTED)
+    process = subprocess.run(
+        [sys.executable, "-c", "from ensemble.startup import main_of; exit(main_of('late'))"],
+        env=os.environ
+        | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"},
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert process.returncode == 0, process.stderr
+    assert (tmp_path / "interrupted.done").exists()
+    assert "Traceback" not in process.stderr
+
+
 INTERRUPTED_TWICE = """
 import os, signal, sys
 from pathlib import Path
