@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -106,6 +107,8 @@ def _opened() -> Iterator[None]:
         with loopback_only() if _has_to_be_bound() else nullcontext():
             opener = rclpy.create_node(OPENER, **OPENER_OPTIONS)
     except RCLError as error:
+        if not rclpy.ok():  # a signal came meanwhile, which shut the context down
+            raise ExternalShutdownException from error
         raise InvalidParameterError(
             f"DDS cannot be started here: {error}. What it wrote above says more; `slap doctor` "
             f"looks at {settings.URI} and the other variables"
