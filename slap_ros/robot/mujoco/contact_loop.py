@@ -51,7 +51,7 @@ class ContactLoopWorld(MeasuredWorld):
             raise InvalidParameterError(
                 f"the hand of {domain.name} has no forces: its robot in MuJoCo is ClosedLoopWorld"
             )
-        self._scene, self._control = scene, control
+        self._scene = scene
         self._servo = HandServo(ContactIndex.of(scene, initial.layout), initial, REACH)
         self.plant = MujocoPlant(
             compiled(scene_spec(scene, initial, control)), scene, initial, control
@@ -68,7 +68,7 @@ class ContactLoopWorld(MeasuredWorld):
         command = self._servo.act(self._state, action)
         if (gap := command.gripper.gap) is not None:
             self._controllers.command_fingers(gap)
-        self._controllers.replace_motion(self._control.replacing(command.points))
+        self._controllers.replace_motion(self.plant.control.replacing(command.points))
         for _ in range(PERIODS):
             self._controllers.pass_period()
         self._state = self._measured(self._state)

@@ -20,10 +20,9 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.mujoco.arm import TORQUE, ArmControl, ArmMotors, MotorLaw, Numbers
 from slap_ros.worlds.contact.hand import rotation_between
-from slap_ros.worlds.contact.hand_model import PANDA
+from slap_ros.worlds.contact.hand_model import PANDA, PANDA_STIFFNESS
 from slap_ros.worlds.panda import JOINTS, GraspKinematics, grasp_pose
 
-STIFFNESS = 3000.0  # N/m, the most that Franka's own controller takes
 DAMPING = 3.3  # √kg: times √stiffness it is N s/m, .7 of critical for the arm that moves along
 FORCE = PANDA.pull_n  # N, along each axis of the base at most
 MOMENT = 8.0  # Nm, about each axis of the base at most
@@ -45,7 +44,7 @@ class HandImpedance:
         InvalidParameterError: It is not above 0.
     """
 
-    stiffness: float = STIFFNESS
+    stiffness: float = PANDA_STIFFNESS
 
     def __post_init__(self) -> None:
         """Check that a hand can be held so."""

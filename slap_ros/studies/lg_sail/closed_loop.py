@@ -39,6 +39,7 @@ from slap_ros.studies.robot_trials import solve_on_robot
 from slap_ros.studies.row_figures import name_rows, plot_interval, plot_whole
 from slap_ros.studies.study import PreparedStudy, Study
 from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.hand_model import PANDA_STIFFNESS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -286,8 +287,8 @@ class ClosedLoopOptions:
     impedance: Annotated[
         list[float] | None,
         CommandOption(
-            "Stiffness with which the hand is pulled, in N/m. May be repeated. Default: 3000, "
-            "without --stiffness.",
+            f"Stiffness with which the hand is pulled, in N/m. May be repeated. "
+            f"Default: {PANDA_STIFFNESS:g}, without --stiffness.",
             name="--impedance",
         ),
     ] = None
@@ -335,7 +336,7 @@ def _arms(options: ClosedLoopOptions) -> list[ArmChoice]:
     Raises:
         InvalidParameterError: There is no such arm.
     """
-    impedances = options.impedance or ([] if options.stiffness else [3000.0])
+    impedances = options.impedance or ([] if options.stiffness else [PANDA_STIFFNESS])
     arms = [ArmChoice(impedance=impedance) for impedance in impedances]
     arms += [ArmChoice(0.0, factor, options.lag) for factor in options.stiffness or ()]
     for arm in arms:
