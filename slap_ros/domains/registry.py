@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module
 from importlib.metadata import Distribution, EntryPoint, distributions
 from traceback import format_exception_only
@@ -54,6 +54,7 @@ class Registrations:
     unreadable: tuple[str, ...]
 
 
+@cache
 def registrations() -> Registrations:
     """Read every distribution by itself: ``entry_points`` raises for all if one is malformed.
 
@@ -120,6 +121,7 @@ def get_domain(name: str, preset: str | None = None) -> Domain:
 
 def forget_domains() -> None:
     """Look again at what is installed, and make domains again."""
+    registrations.cache_clear()
     _factory.cache_clear()
     _make.cache_clear()
 
