@@ -7,7 +7,8 @@ the results are the same on every processor.
 
 Machine code is kept in the user's cache, in a folder of its own for these sources, this numba and
 this processor. numba alone looks at one file only, so that it would call what another file had
-before a change, and processors that share a home would overwrite each other's code.
+before a change, and processors that share a home would overwrite each other's code. It would also
+look at where the file is and how old, and compile the same sources again in each checkout.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
@@ -25,6 +27,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from llvmlite import binding
+from numba.core import caching
 from numba.np import linalg
 
 from slap_ros.files import user_cache
@@ -89,11 +92,43 @@ def compiled(function: Function) -> Function:
     made: Any = inner(function)
     folder = cache_folder()
     if folder is not None:
-        before, _config.CACHE_DIR = _config.CACHE_DIR, str(folder)
-        made.enable_caching()
-        _config.CACHE_DIR = before
+        made._cache = _KeptFunction(function)
         _spare(made._cache)
     return cast(Function, made)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where numba keeps the machine code of a function: the folder says what it was made from."""
+
+    folder: Path
+    module: str
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _Place:  # noqa: ARG003
+        folder = cache_folder()
+        assert folder is not None  # else nothing is kept
+        return cls(folder, function.__module__)
+
+    def ensure_cache_path(self) -> None:
+        """Do nothing: the folder is there."""
+
+    def get_cache_path(self) -> str:
+        return str(self.folder)
+
+    def get_source_stamp(self) -> str:
+        return ""
+
+    def get_disambiguator(self) -> str:
+        return self.module
+
+
+class _KeptCode(caching.CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (_Place,)
+
+
+class _KeptFunction(caching.FunctionCache):  # type: ignore[misc]
+    _impl_class = _KeptCode
 
 
 def _spare(machine_code: Any) -> None:
@@ -147,17 +182,17 @@ def cache_folder() -> Path | None:
 def _digest() -> str:
     """Of all that machine code is made from."""
     digest = blake2b(digest_size=8)
-    for source in _sources():
-        # numba compares times, too.
-        digest.update(f"{source} {source.stat().st_mtime_ns}\n".encode() + source.read_bytes())
+    package = Path(__file__).parent
+    for source in _sources(package):
+        content = source.read_bytes()
+        digest.update(f"{source.relative_to(package)} {len(content)}\n".encode() + content)
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
     chosen = _config.CPU_NAME, _config.CPU_FEATURES
     digest.update(repr((numba.__version__, processor, chosen)).encode())
     return digest.hexdigest()
 
 
-def _sources() -> list[Path]:
-    package = Path(__file__).parent
+def _sources(package: Path) -> list[Path]:
     return sorted(file for pattern in SOURCES for file in package.glob(pattern))
 
 

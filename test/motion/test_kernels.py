@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiled motion is that of numpy to the bit: frames, collisions, lines, paths and trees."""
 
+import shutil
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import slap_ros
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import from_yaw
 from slap_ros.motion import CollisionChecker, MotionPlanningError, plan_path, shifted
@@ -235,19 +238,31 @@ print(arm_frames(np.zeros((1, 7))).shape)
     assert result(done)[0] == ["(1,", "7,", "4,", "4)"]
 
 
+SOURCES = Path(slap_ros.__file__).parent
 PART = """
-from slap_ros.motion.kernels import trigonometry
+import numpy as np
+from slap_ros.motion.kernels.kinematics import arm_frames
 from slap_ros.compilation import compile_once
-compile_once([lambda: trigonometry.sin_cos(0.3)])
-print(*map(float.hex, trigonometry.sin_cos(0.3)))
+compile_once([lambda: arm_frames(np.zeros((1, 7)))])
+print(arm_frames(np.ones((1, 7))).sum().hex(), sum(arm_frames.stats.cache_hits.values()))
 """
 
 
+def other_checkout(folder):
+    """The same sources elsewhere, and younger."""
+    copy = folder / "checkout"
+    shutil.copytree(SOURCES, copy / "slap_ros", ignore=shutil.ignore_patterns("__pycache__"))
+    for source in copy.rglob("*.py"):
+        source.touch()
+    return {"PYTHONPATH": str(copy)}
+
+
 @pytest.mark.slow
-def test_two_processes_that_compile_at_once_share_one_cache(tmp_path):
+def test_processes_that_compile_at_once_and_other_checkouts_share_one_cache(tmp_path):
     both = [run(PART, XDG_CACHE_HOME=str(tmp_path)) for _ in range(2)]
     results = [result(process) for process in both]
-    later = result(run(PART, XDG_CACHE_HOME=str(tmp_path)))
-    assert results[0][0] == results[1][0] == later[0]
+    later = result(run(PART, XDG_CACHE_HOME=str(tmp_path), **other_checkout(tmp_path)))
+    assert results[0][0][0] == results[1][0][0] == later[0][0]
     assert sum("compiling" in err for _, err in results) == 1
     assert "compiling" not in later[1]
+    assert later[0][1] == "1"  # of the same sources elsewhere
