@@ -273,6 +273,15 @@ def test_a_negative_cost_is_refused_with_its_place() -> None:
         ground_task(stated, task)
 
 
+def test_a_second_value_is_refused_with_its_place_unless_it_is_the_same() -> None:
+    text = domain(act("(and (done) (increase (total-cost) (toll)))"), more="(:functions (toll))")
+    stated, metric = parse_domain(text), "(:metric minimize (total-cost))"
+    twice = parse_problem(problem("(= (toll) 2) (= (toll) 2.0)", "(done)", more=metric), stated)
+    assert twice.values == {("toll", ()): 2.0}
+    with pytest.raises(MalformedPddlError, match=r":\d+:\d+: \(toll\) is 3 here and 2 before"):
+        parse_problem(problem("(= (toll) 2) (= (toll) 3)", "(done)", more=metric), stated)
+
+
 def test_only_what_leads_to_the_goal_gets_bits() -> None:
     text = domain(
         act("(and (done) (not (q ?x)))", "(p ?x)", "?x")

@@ -169,7 +169,12 @@ class _InitialState:
         if target.head == TOTAL_COST:
             return  # where cost begins is no matter
         name, arguments = read_application(target, self.domain.functions)
-        self.values[name, tuple(self.scope.find(node).name for node in arguments)] = number
+        key = name, tuple(self.scope.find(node).name for node in arguments)
+        if self.values.setdefault(key, number) != number:
+            raise MalformedPddlError(
+                f"{listed.position}: ({' '.join((name, *key[1]))}) is {number:g} here and "
+                f"{self.values[key]:g} before"
+            )
 
 
 def _minimises_cost(definition: PddlDefinition) -> bool:
