@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plans from a measured hand that is inside something by the planner's shapes begin outside."""
+"""Plans from a measured hand that is where the planner's hand cannot be begin beside."""
 
 import json
 import math
@@ -10,17 +10,20 @@ import numpy as np
 import pytest
 
 from slap_ros.domains.benchtop.state_access import POSITION, TARGET, hand_pose, hand_target
+from slap_ros.domains.make_coffee.scenery import scene_of
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import State
 from slap_ros.skills.domain_choice import DEMONSTRATOR, NO_SKILLS, DomainChoice, open_domain
 from slap_ros.worlds.contact.arm import arm_joints
-from slap_ros.worlds.contact.clearing import CLEAR, DEEPEST
+from slap_ros.worlds.contact.clearing import CLEAR, DEEPEST, FROM_END
 from slap_ros.worlds.contact.features import ROBOT, robot_features
 from slap_ros.worlds.contact.hand import PAD, hand_at
+from slap_ros.worlds.contact.snapshot import ContactIndex
 from slap_ros.worlds.contact.validation import OVERLAP
 from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.panda import JOINT_HIGH, grasp_pose
 
 BENCHES = ("bowls", "groceries", "make_coffee", "peg_in_hole", "stack_at_target", "stow_hammer")
 # Measured in MuJoCo: the pod is inserted, and the hand leans on the open lid.
@@ -128,6 +131,28 @@ def test_fingers_in_a_table_are_raised_at_every_bench(name):
         else:
             assert start is low
         assert open_domain(DomainChoice(name, skills=NO_SKILLS)).to_plan_from(low) is low
+
+
+def test_an_arm_at_the_end_of_a_joint_is_put_back_into_its_plane(coffee):
+    """An elbow may be out of the plane in which the planner has it, and joint 7 at its end."""
+    state = coffee.task(0).initial_state
+    (robot,) = state.layout.of_type(ROBOT)
+    index = ContactIndex.of(scene_of(state), state.layout)
+    for aside in (-0.004, -0.3):  # rad, of joint 3
+        joints = (0.0, 0.4, aside, -2.3, 0.0, 2.7, JOINT_HIGH[6])
+        pose = grasp_pose(joints)
+        x, y, _, _ = pose.quaternion
+        hand = hand_at(pose.position, 2.0 * math.atan2(y, x))._replace(pose=pose)
+        measured = index.write(state, index.read(state)._replace(joints=joints, hand=hand))
+        require_refused(coffee, measured, "the arm cannot have its hand at")
+        start = coffee.to_plan_from(measured)
+        if aside > -0.1:
+            coffee.make_world(start).close()
+            assert math.dist(hand_pose(start).position, pose.position) < 0.005
+            there = [float(start.get(robot, name)) for name in JOINTS]
+            assert there == pytest.approx((*joints[:2], 0.0, *joints[3:]), abs=2.0 * FROM_END)
+        else:
+            assert start is measured
 
 
 def test_what_is_held_goes_along(coffee):

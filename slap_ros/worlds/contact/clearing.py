@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A measured hand that is inside something by the planner's shapes, moved out of it.
+"""A measured hand that is where the planner's hand cannot be, moved to where that can be, nearby.
 
 The planner's palm is a box, and a Panda's is bevelled: where the real one leans on a lid, the box
-is inside of it. Such a state is possible, but no plan can begin in it. So the plan begins where the
-hand comes free by the shortest way, as MoveIt's start state adapters have it.
+is inside of it. And a Panda's elbow may be a little out of its plane, so that at the end of a joint
+the planner's arm cannot quite have the hand there. Such states are possible, but no plan can begin
+in them. So the plan begins beside, as MoveIt's start state adapters have it.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ from slap_ros.worlds.contact.arm import arm_joints
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot
 from slap_ros.worlds.contact.validation import hand_obstacles, too_deep
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, grasp_pose
 
 # The palm's lower edges reach 18 mm out of a Panda's hand, and contacts give way by a little. A
-# hand that is deeper inside something is not there by its shape.
+# hand that is deeper inside something is not there because of its shape.
 DEEPEST = 0.02  # m
+FROM_END = 1e-4  # rad, of a joint from its end
 CLEAR = 1e-4  # m, between the hand and what it was moved out of
 ROUNDS = 12  # in which the hand is moved out of what it is in, one thing after the other
 
@@ -36,20 +39,33 @@ def cleared(scene: ContactScene, state: State) -> State:
         state: Measured state.
 
     Returns:
-        The same state, unless the hand is so deep in something that no world would begin in it.
-        Then one with the hand, its target and what it holds moved out of everything that the hand
-        is in. The state is not changed where that is further than :data:`DEEPEST`, where there is
-        no room, or where the arm cannot have its hand there: a world refuses it.
+        The same state, unless the hand is so deep in something, or an arm so near the end of a
+        joint, that no world would begin in it. Then one with the hand, its target and what it holds
+        moved out of everything that the hand is in. The state is not changed where that is further
+        than :data:`DEEPEST`, where there is no room, or where the arm cannot have its hand there: a
+        world refuses it.
     """
     index = ContactIndex.of(scene, state.layout)
-    snapshot = index.read(state)
-    boxes = snapshot.hand.boxes()
+    measured = index.read(state)
+    snapshot = _in_plane(measured)
     obstacles = hand_obstacles(scene, snapshot, index.placement(scene, state))
-    if not too_deep(boxes, obstacles):
-        return state
-    way = _way_out(boxes, obstacles)
-    moved = None if way is None else _moved(snapshot, way)
-    return state if moved is None else index.write(state, moved)
+    if too_deep(snapshot.hand.boxes(), obstacles):
+        way = _way_out(snapshot.hand.boxes(), obstacles)
+        snapshot = (
+            measured if way is None else _moved(snapshot, Pose(way).compose(snapshot.hand.pose))
+        )
+    return state if snapshot is measured else index.write(state, snapshot)
+
+
+def _in_plane(snapshot: ContactSnapshot) -> ContactSnapshot:
+    """The physics with the elbow in its plane, where the hand can be nowhere else."""
+    if arm_joints(snapshot.hand.pose) is not None:
+        return snapshot
+    q1, q2, _, *rest = (
+        min(max(q, low + FROM_END), high - FROM_END)
+        for q, low, high in zip(snapshot.joints, JOINT_LOW, JOINT_HIGH, strict=True)
+    )
+    return _moved(snapshot, grasp_pose((q1, q2, 0.0, *rest)))
 
 
 def _way_out(boxes: Sequence[OrientedBox], obstacles: Sequence[OrientedBox]) -> Vector | None:
@@ -74,26 +90,25 @@ def _way_out(boxes: Sequence[OrientedBox], obstacles: Sequence[OrientedBox]) -> 
     return None
 
 
-def _moved(snapshot: ContactSnapshot, way: Vector) -> ContactSnapshot | None:
-    """The physics with the hand, its target and what it holds moved; None out of the arm's reach.
+def _moved(snapshot: ContactSnapshot, pose: Pose) -> ContactSnapshot:
+    """The physics with the hand, its target and what it holds moved; as it is out of reach.
 
     Args:
         snapshot: Physics of the state.
-        way: Translation of the hand, m.
+        pose: Pose of the hand.
     """
-    shift, hand = Pose(way), snapshot.hand
-    pose = shift.compose(hand.pose)
-    joints = arm_joints(pose)
-    if joints is None:
-        return None
+    hand, joints = snapshot.hand, arm_joints(pose)
+    way = tuple(p - q for p, q in zip(pose.position, hand.pose.position, strict=True))
+    if joints is None or math.hypot(*way) > DEEPEST:
+        return snapshot
     bodies = list(snapshot.bodies)
     if snapshot.held is not None:
         held = bodies[snapshot.held]
-        bodies[snapshot.held] = held._replace(pose=shift.compose(held.pose))
+        there = pose.compose(hand.pose.inverse()).compose(held.pose)
+        bodies[snapshot.held] = held._replace(pose=there)
+    x, y, z = (t + w for t, w in zip(hand.target, way, strict=True))
     return snapshot._replace(
-        joints=joints,
-        hand=hand._replace(pose=pose, target=shift.apply(hand.target)),
-        bodies=tuple(bodies),
+        joints=joints, hand=hand._replace(pose=pose, target=(x, y, z)), bodies=tuple(bodies)
     )
 
 
