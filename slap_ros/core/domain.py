@@ -55,12 +55,13 @@ class Execution:
         control_period_s: Duration of one environment step, s.
         settle: Function that puts measured poses where physics would have them. What rests on
             something in the given state still rests on it afterwards.
-        lift: Function that lifts what is held off what it touches.
+        clear: Function that clears a measured state, so that a plan can begin in it: what is held
+            of what it touches, or a hand of what it is inside by the planner's shapes.
     """
 
     control_period_s: float
     settle: Callable[[State], State] = lambda state: state
-    lift: Callable[[State], State] = lambda state: state
+    clear: Callable[[State], State] = lambda state: state
 
     def __post_init__(self) -> None:
         """Check the period.
@@ -253,12 +254,12 @@ class Domain(ShownInNotebooks):
         return SyncVectorWorld(self.make_world, states)
 
     def to_plan_from(self, state: State) -> State:
-        """The state that a plan begins in; a measured one is not taken to touch what it holds.
+        """The state that a plan begins in: a measured one is cleared, another stays as it is.
 
         Args:
             state: Newest state.
         """
-        return self.execution.lift(state) if self.is_measured else state
+        return self.execution.clear(state) if self.is_measured else state
 
     def model_world(self, state: State) -> World:
         """A world as planners know it, in a state; it is nobody else's."""

@@ -115,12 +115,15 @@ class GraphPlanner:
     def past_unforeseen(self, state: State, goal: int) -> PlanningResult | None:
         """A plan from where no operators lead to the goal; None if none is found.
 
+        With acquired skills, it is looked for from measured states alone: a robot may stop
+        anywhere. In the planner's own world, only plans that are known to fail end there.
+
         Args:
             state: Low-level state to start from.
             goal: Mask of atoms that must hold.
         """
         before = self.problem.model.executed
-        if not self.problem.exact:
+        if not (self.problem.exact or self.problem.measured):
             return None
         for planner in (self, self.deepened()):
             found = UnforeseenSearch(self.problem, goal, planner.search_to).plan(state)

@@ -63,12 +63,14 @@ class Problem:
         operators: To plan with.
         unskilled: Operators that lack a skill, for messages.
         exact: Whether nothing else changes than what operators say, as with given skills.
+        measured: Whether states are measured on a robot, which may stop where no operator begins.
     """
 
     model: Model
     operators: GroundedOptions
     unskilled: tuple[GroundOperator, ...] = ()
     exact: bool = True
+    measured: bool = False
 
     @classmethod
     def of(cls, domain: Domain, initial: State, is_canceled: Callable[[], bool] = never) -> Problem:
@@ -86,7 +88,8 @@ class Problem:
         space = domain.atom_space(initial)
         unskilled = ground_operators(domain.unskilled, space)
         options = ground_options(domain, space)
-        return cls(Model.of(domain, initial, is_canceled), options, unskilled, domain.exact)
+        model = Model.of(domain, initial, is_canceled)
+        return cls(model, options, unskilled, domain.exact, domain.is_measured)
 
     def require_reachable(self, start: int, goal: int) -> None:
         """Refuse a goal that is easily seen to be out of reach.

@@ -222,7 +222,7 @@ class ServoedRobot:
         state = self._index.write(
             self._template, snapshot._replace(joints=joints, hand=hand, bodies=bodies, held=held)
         )
-        self._model.reset(state)
+        self._model.reset(self.domain.execution.clear(state))
         self._state = state
         return state
 

@@ -10,7 +10,10 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import UnsolvableError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import solve
+from slap_ros.geometry.pose import rotate
 from slap_ros.planning.planner import make_planner
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.worlds.features import pose_of
 from support.states import fluent_atoms
 
 DOMAIN = get_domain("obstacle_tower", "fair:obstacles=0,distractors=0")
@@ -19,6 +22,7 @@ WITH_TOWER = get_domain("obstacle_tower", "fair:obstacles=3,distractors=0")
 TOWER = WITH_TOWER.task(0)
 WITH_TOYS = get_domain("cleanup_table", "fair:toys=1")
 TABLE = WITH_TOYS.task(0)
+HALF_OPEN = 0.05  # m, of a drawer: neither open nor closed
 
 
 def half_on_target(beside):
@@ -88,6 +92,31 @@ def test_what_was_lifted_half_of_the_way_is_lifted_on(planner):
     plan = make_planner(planner, WITH_TOYS, lifted).plan(lifted, goal).plan
     lift, drop, *_ = map(str, (edge.option for edge in plan.edges))
     assert (lift, drop) == ("Lift(robot, wiper, table)", "Drop(robot, wiper, bin)")
+
+
+def half_open():
+    """A drawer that was left half open, with what stands in it: no operator begins there."""
+    state = get_domain("make_coffee").task(300).initial_state
+    cabinet, pod = (state.layout.object(name) for name in ("cabinet", "pod"))
+    way = rotate(pose_of(state, cabinet).quaternion, (0.0, HALF_OPEN, 0.0))
+    there = {(pod, axis): state.get(pod, axis) + w for axis, w in zip("xyz", way, strict=True)}
+    return state.replace({(cabinet, "opening"): HALF_OPEN} | there)
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_acquired_skills_go_on_from_where_a_robot_stopped(measured):
+    """And in the planner's own world, they end where they did in training, or fail."""
+    pytest.importorskip("pybullet")
+    domain, state = open_domain(DomainChoice("make_coffee", measured=measured)), half_open()
+    space = domain.atom_space(state)
+    goal = space.bit(space.atom("IsCabinetClose", ("cabinet",)))
+    planner = make_planner("lazy", domain, state)
+    if measured:
+        edges = planner.plan(state, goal).plan.edges
+        assert [edge.option.skill.name for edge in edges] == ["Open", "Close"]
+    else:
+        with pytest.raises(UnsolvableError, match="IsCabinetClose"):
+            planner.plan(state, goal)
 
 
 def test_what_no_skill_can_do_stays_unsolvable():

@@ -14,7 +14,9 @@ from slap_ros.evaluation.experiment import solve
 from slap_ros.planning.planner import make_planner
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.studies.robot_trials import solve_on_robot
+from slap_ros.worlds.contact.clearing import DEEPEST
 from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.hand import PALM
 from slap_ros.worlds.contact.snapshot import ContactIndex
 from slap_ros.worlds.panda import grasp_pose
 
@@ -174,6 +176,29 @@ def test_a_pandas_hand_in_the_contact_world_goes_as_the_impedance_pulls_it():
         assert there.pose.position == pytest.approx(here.pose.position, abs=4e-3)
     assert there.pose.position == pytest.approx(there.target, abs=1e-3)
     model.close()
+
+
+def lower_edges_outside_m():
+    """How far the planner's palm reaches out of the hand that MuJoCo has, downwards, m."""
+    model = arm_spec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    joints = [float(data.qpos[model.joint(name).qposadr[0]]) for name in ARM_JOINTS]
+    geom = int(np.flatnonzero(model.geom_bodyid == model.body("panda_hand").id)[0])
+    mesh, frame = model.geom_dataid[geom], grasp_pose(joints).inverse()
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    turn, origin = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+    corners = model.mesh_vert[first : first + count] @ turn.T + origin
+    hand = np.array([frame.apply(tuple(corner)) for corner in corners])
+    ways = np.random.default_rng(0).normal(size=(20_000, 3))
+    ways[:, 2] = np.abs(ways[:, 2])  # z of the hand points down
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    palm = np.abs(ways) @ PALM.half_extents_m + ways @ PALM.pose.position
+    return float((palm - (ways @ hand.T).max(axis=1)).max())
+
+
+def test_a_hand_is_cleared_as_far_as_the_planners_palm_is_wider_than_a_pandas():
+    assert 0.017 < lower_edges_outside_m() < DEEPEST
 
 
 def solved(domain, control, seed=SEED):

@@ -25,7 +25,12 @@ from slap_ros.robot.scene_config import sampled_scene_config
 from slap_ros.robot.servoed_robot import ServoedRobot, require_servoed
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.worlds.contact.arm import arm_joints
+from slap_ros.worlds.contact.clearing import DEEPEST
 from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.hand import PAD, hand_at
+from slap_ros.worlds.contact.validation import OVERLAP
+from slap_ros.worlds.panda import FINGER_OPEN
 
 pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")
@@ -37,6 +42,7 @@ from slap_ros.robot.mujoco.plant_controllers import REACH, UNCHECKED, PlantContr
 SEED = 300
 RATE_S, LATE_S, JOINTS_S = 1 / 30, 0.02, 0.01  # as of the node in MuJoCo
 EXACT = TrackingSettings(position_noise_m=0.0005, turn_noise_rad=0.005)
+TIPS = PAD.pose.position[2] + PAD.half_extents_m[2]  # m, below the grasp point
 DOWN = np.array([0.0, 0.0, -0.02, 0.0, 0.0])
 
 
@@ -206,6 +212,25 @@ def test_what_is_not_measured_gives_no_state(domain):
         robot.add_joint_reading(reading)
     with pytest.raises(InvalidMeasurementError, match="are positions in m"):
         robot.add_detection("detected_cube0", 1.0, IDENTITY, Pose((500.0, 0.0, 20.0)))
+
+
+def test_a_hand_that_plans_can_be_cleared_of_a_table_is_measured(domain):
+    """Fingers are in it by the planner's shapes. Much deeper, joints are measured wrongly."""
+    initial = domain.task(SEED).initial_state
+    for depth in (0.5 * (OVERLAP + DEEPEST), 1.1 * DEEPEST):
+        robot = ServoedRobot(domain, sampled_scene_config(initial), REACH, EXACT)
+        joints = arm_joints(hand_at((0.45, 0.0, TIPS - depth)).pose)
+        for i in range(1, 5):
+            for name, pose in MujocoPlant.of(domain, initial).poses().items():
+                robot.add_detection(f"detected_{name}", 0.1 * i, IDENTITY, pose)
+            robot.add_joint_reading(JointReading(0.1 * i, joints, (0.0,) * 7, 2.0 * FINGER_OPEN))
+        if depth < DEEPEST:
+            state = robot.begin(0.0)
+            (hand,) = state.layout.of_type(ROBOT)
+            assert state.get(hand, "z") == pytest.approx(TIPS - depth)  # as it is measured
+        else:
+            with pytest.raises(InvalidStateError, match="the hand and table are inside"):
+                robot.begin(0.0)
 
 
 def test_where_something_slides_or_there_is_no_hand_is_named():

@@ -27,6 +27,7 @@ from slap_ros.domains.benchtop.sides import make_sides
 from slap_ros.domains.benchtop.visualization import VIEW, display
 from slap_ros.relational import Layout, Metric, Predicate, State, Type
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
+from slap_ros.worlds.contact.clearing import cleared
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.hand_model import HANDS, HandModel
 from slap_ros.worlds.contact.scene import ContactScene
@@ -132,6 +133,7 @@ def benchtop_domain(
         execution=Execution(
             control_period_s=CONTROL_PERIOD_S,
             settle=lambda state: settled(scene_of(state), state),
+            clear=lambda state: cleared(scene_of(state), state),
         ),
         display=display(scene_of, model.view),
         metrics=(*COMMON, *model.metrics),

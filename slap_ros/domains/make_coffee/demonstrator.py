@@ -18,7 +18,15 @@ from slap_ros.domains.benchtop.approach import (
 )
 from slap_ros.domains.benchtop.cabinet import CABINET
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, GoalOf, HandGoal
-from slap_ros.domains.benchtop.scripts import GENTLE, Move, follow, grasp, over, release
+from slap_ros.domains.benchtop.scripts import (
+    BELOW_GRASP,
+    GENTLE,
+    Move,
+    follow,
+    grasp,
+    over,
+    release,
+)
 from slap_ros.domains.benchtop.state_access import (
     axis_of,
     hand_position,
@@ -27,7 +35,7 @@ from slap_ros.domains.benchtop.state_access import (
     value,
     yaw_of,
 )
-from slap_ros.domains.make_coffee.scenery import HINGE, HOLDER, POD, lid_pose
+from slap_ros.domains.make_coffee.scenery import HINGE, HOLDER, POD, RIM, lid_pose
 from slap_ros.geometry.pose import Vector
 from slap_ros.relational import Object, State
 from slap_ros.worlds.features import pose_of
@@ -35,6 +43,9 @@ from slap_ros.worlds.features import pose_of
 TRAVEL_HEIGHT = 0.23  # of the grasp point, which then passes over an open lid
 LIFT = 0.1  # of a pod that was picked
 PRESS = 0.001  # over the bottom of the holder, where a pod is let go
+# Height of the grasp point at which fingers are over the rim of the holder. Fingers that lean on it
+# do not open, and a hand that slips on a pod, as a Panda's does, would come so deep.
+OVER_RIM = RIM + BELOW_GRASP
 # Where fingers touch the back of an open lid, in its frame, and how far they are from it then. Near
 # its edge: further down, random motions turn it over in a tenth of the episodes and more.
 BACK: Vector = (-0.1, 0.0, 0.015)
@@ -108,6 +119,23 @@ def inserting(pod: Object, holder: Object, height: float = 0.0) -> GoalOf:
     return goal
 
 
+def letting_go(pod: Object, holder: Object) -> GoalOf:
+    """Where the hand lets a pod go: just over its place, but with the fingers over the rim.
+
+    Args:
+        pod: Pod in the hand.
+        holder: Holder that the pod goes into.
+    """
+    inserted = inserting(pod, holder, PRESS)
+
+    def goal(state: State) -> HandGoal:
+        there, (*_, table) = inserted(state), position_of(state, holder)
+        *_, z = there.position
+        return there.at_height(max(z, table + OVER_RIM))
+
+    return goal
+
+
 def pushing(holder: Object, ahead: float, up: float) -> GoalOf:
     """A place for the hand, seen from the hinge.
 
@@ -143,7 +171,7 @@ def insert(state: State, objects: tuple[Object, ...]) -> Policy:
     pod, holder = objects
     return follow(
         *over(state, inserting(pod, holder)(state), CLOSE, TRAVEL_HEIGHT),
-        Move(inserting(pod, holder, PRESS), CLOSE, fastest=GENTLE),
+        Move(letting_go(pod, holder), CLOSE, fastest=GENTLE),
         release(),
     )
 

@@ -97,7 +97,7 @@ def tabletop_domain(
         execution=Execution(
             control_period_s=CONTROL_PERIOD_S,
             settle=settling(model.scene_of),
-            lift=lifting(model.scene_of),
+            clear=lifting(model.scene_of),
         ),
         display=Display(
             bodies=lambda state: visible_bodies(model.scene_of(state), state),

@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 
 from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.worlds.contact.arm import arm_joints
 from slap_ros.worlds.contact.hand import LEASH, PAD, YAW_LEASH, HandState, rotation_between, wrapped
@@ -25,6 +26,8 @@ FAR = 50.0  # m, from the base: nothing gets there
 FAST = 20.0  # m/s: nothing becomes that fast
 FAST_SPIN = 500.0  # rad/s
 GRASP_GAP = 0.003  # m, at most, between a pad and what is held
+
+NamedBoxes = tuple[str, tuple[OrientedBox, ...]]  # inside a body, with its name
 
 
 def require_possible(
@@ -115,31 +118,75 @@ def _require_arm(snapshot: ContactSnapshot) -> None:
         )
 
 
+def hand_obstacles(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> list[OrientedBox]:
+    """What the hand must not be inside: everything solid, but not what it holds.
+
+    Args:
+        scene: Bodies of the scene.
+        snapshot: Physics of the state.
+        placement: Poses of the bodies that do not move.
+
+    Returns:
+        Boxes inside these bodies.
+    """
+    free = _free(scene, snapshot)
+    loose = (one for i, one in enumerate(free) if i != snapshot.held)
+    others = (*loose, *_jointed(scene, snapshot, placement), *_fixed(scene, placement))
+    return [box for _, boxes in others for box in boxes]
+
+
+def too_deep(some: Sequence[OrientedBox], others: Sequence[OrientedBox]) -> bool:
+    """Whether any of some boxes is deeper inside any of others than bodies that are pressed."""
+    return share_space(_pressed(some), _pressed(others))
+
+
 def _require_apart(scene: ContactScene, snapshot: ContactSnapshot, placement: Placement) -> None:
     """Refuse what is inside something else; a jointed body may be inside itself."""
     movable = [
+        *_free(scene, snapshot),
+        *_jointed(scene, snapshot, placement),
+        ("the hand", snapshot.hand.boxes()),
+    ]
+    placed = [(name, _pressed(boxes)) for name, boxes in _fixed(scene, placement)]
+    for name, boxes in movable:
+        cores = _pressed(boxes)
+        for other, others in placed:
+            if share_space(cores, others):
+                raise InvalidStateError(f"{name} and {other} are inside one another")
+        placed.append((name, cores))
+
+
+def _free(scene: ContactScene, snapshot: ContactSnapshot) -> list[NamedBoxes]:
+    return [
         (body.name, body.cores(motion.pose))
         for body, motion in zip(scene.free, snapshot.bodies, strict=True)
     ]
-    movable += [
+
+
+def _jointed(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> list[NamedBoxes]:
+    return [
         (body.name, body.cores(pose, opening.position))
         for body, pose, opening in zip(
             scene.jointed, placement.jointed, snapshot.openings, strict=True
         )
     ]
-    movable.append(("the hand", snapshot.hand.boxes()))
-    fixed = [
+
+
+def _fixed(scene: ContactScene, placement: Placement) -> list[NamedBoxes]:
+    return [
         (body.name, body.cores(pose))
         for body, pose in zip(scene.fixed, placement.fixed, strict=True)
         if body.solid
     ]
-    placed = [(name, [box.shrunk(OVERLAP / 2) for box in boxes]) for name, boxes in fixed]
-    for name, boxes in movable:
-        cores = [box.shrunk(OVERLAP / 2) for box in boxes]
-        for other, others in placed:
-            if share_space(cores, others):
-                raise InvalidStateError(f"{name} and {other} are inside one another")
-        placed.append((name, cores))
+
+
+def _pressed(boxes: Sequence[OrientedBox]) -> list[OrientedBox]:
+    """Boxes less what pressed bodies overlap by."""
+    return [box.shrunk(OVERLAP / 2) for box in boxes]
 
 
 def _require_held(scene: ContactScene, snapshot: ContactSnapshot) -> None:
