@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.worlds.contact.arm import arm_joints
 from slap_ros.worlds.contact.hand import LEASH, PAD, YAW_LEASH, HandState, rotation_between, wrapped
@@ -25,6 +26,8 @@ FAR = 50.0  # m, from the base: nothing gets there
 FAST = 20.0  # m/s: nothing becomes that fast
 FAST_SPIN = 500.0  # rad/s
 GRASP_GAP = 0.003  # m, at most, between a pad and what is held
+
+NamedBoxes = tuple[str, Sequence[OrientedBox]]
 
 
 def require_possible(
@@ -45,14 +48,32 @@ def require_possible(
     _require_near_and_slow(scene, snapshot, placement)
     _require_hand(snapshot.hand, gripper)
     _require_arm(snapshot)
-    for body, opening in zip(scene.jointed, snapshot.openings, strict=True):
-        high = body.joint.high
-        if not 0.0 <= opening.position <= high:
-            raise InvalidStateError(
-                f"the opening of {body.name} is {opening.position}, not within [0, {high}]"
-            )
-    _require_apart(scene, snapshot, placement)
+    _require_openings(scene, snapshot)
+    movable = [*_movable(scene, snapshot, placement), ("the hand", snapshot.hand.boxes())]
+    _require_apart(scene, placement, movable)
     _require_held(scene, snapshot)
+
+
+def require_possible_bodies(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> None:
+    """Refuse bodies that cannot be as they were detected, wherever encoders have the hand.
+
+    An arm that is pushed has its hand where this world's could not have it, and fingers are
+    narrower than this world's: that is so, and no error of measurement.
+
+    Args:
+        scene: Bodies of the scene.
+        snapshot: Physics of the state; all numbers are finite.
+        placement: Poses of the bodies that do not move.
+
+    Raises:
+        InvalidStateError: Names the value that is wrong, and what would be right.
+    """
+    require_rotations(_poses(scene, snapshot, placement))
+    _require_near_and_slow(scene, snapshot, placement)
+    _require_openings(scene, snapshot)
+    _require_apart(scene, placement, _movable(scene, snapshot, placement))
 
 
 def _require_near_and_slow(
@@ -115,19 +136,31 @@ def _require_arm(snapshot: ContactSnapshot) -> None:
         )
 
 
-def _require_apart(scene: ContactScene, snapshot: ContactSnapshot, placement: Placement) -> None:
+def _require_openings(scene: ContactScene, snapshot: ContactSnapshot) -> None:
+    for body, opening in zip(scene.jointed, snapshot.openings, strict=True):
+        high = body.joint.high
+        if not 0.0 <= opening.position <= high:
+            raise InvalidStateError(
+                f"the opening of {body.name} is {opening.position}, not within [0, {high}]"
+            )
+
+
+def _movable(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> list[NamedBoxes]:
+    """Boxes inside each body that moves, or of which a part does."""
+    free = zip(scene.free, snapshot.bodies, strict=True)
+    jointed = zip(scene.jointed, placement.jointed, snapshot.openings, strict=True)
+    return [
+        *((body.name, body.cores(motion.pose)) for body, motion in free),
+        *((body.name, body.cores(pose, opening.position)) for body, pose, opening in jointed),
+    ]
+
+
+def _require_apart(
+    scene: ContactScene, placement: Placement, movable: Iterable[NamedBoxes]
+) -> None:
     """Refuse what is inside something else; a jointed body may be inside itself."""
-    movable = [
-        (body.name, body.cores(motion.pose))
-        for body, motion in zip(scene.free, snapshot.bodies, strict=True)
-    ]
-    movable += [
-        (body.name, body.cores(pose, opening.position))
-        for body, pose, opening in zip(
-            scene.jointed, placement.jointed, snapshot.openings, strict=True
-        )
-    ]
-    movable.append(("the hand", snapshot.hand.boxes()))
     fixed = [
         (body.name, body.cores(pose))
         for body, pose in zip(scene.fixed, placement.fixed, strict=True)
