@@ -162,6 +162,29 @@ def test_a_thing_has_the_velocity_of_its_last_detections(domain):
     assert float(moved.get(cube, "y")) == pytest.approx(y - 0.03)
 
 
+def test_things_inside_one_another_are_no_state_and_a_hand_inside_one_is_where_encoders_say(domain):
+    """Real fingers are narrower than the planner's: a skill goes on, but no task begins there."""
+    world = MeasuredPlant(domain)
+    robot, began_s = world.robot, world.now_s
+    (hand,) = world.state.layout.of_type(ROBOT)
+    x, y, z = (float(world.state.get(hand, axis)) for axis in "xyz")
+    other = world.plant.poses()["cube1"]
+
+    def seen_at(pose, after_s):
+        for i in range(1, 4):
+            for name, at in (("cube0", pose), ("cube1", other)):
+                robot.add_detection(f"detected_{name}", began_s + after_s + i, IDENTITY, at)
+
+    seen_at(Pose((x, y, z + 0.1)), 0.0)
+    state = robot.measure(-math.inf)
+    assert float(state.get(state.layout.object("cube0"), "z")) == pytest.approx(z + 0.1)
+    with pytest.raises(InvalidStateError, match="the hand and cube0 are inside one another"):
+        robot.begin(-math.inf)
+    seen_at(other, 3.0)
+    with pytest.raises(InvalidStateError, match="cube1 and cube0 are inside one another"):
+        robot.measure(-math.inf)
+
+
 def test_time_that_passes_faster_is_taken_into_account(domain):
     velocities = []
     for pace in (1.0, 5.0):
