@@ -198,7 +198,13 @@ def _object(
     given = {str(k): float(v) for k, v in entry.get("features", {}).items()}
     obj = kinds[entry["type"]](name)
     if _has(obj, "opening"):
-        return obj, {**_standing(entry), **opening_features(0.0), **given}, _frames(entry)
+        if "pose" not in entry or len(entry.keys() & {"frame", "frames"}) != 1:
+            raise ValueError(
+                "what opens needs a pose, at which it stands, and either a frame, or several "
+                "frames, in which its part that opens is detected"
+            )
+        shut = {**pose_features(_pose(entry["pose"])), **opening_features(0.0)}
+        return obj, {**shut, **given}, _frames(entry)
     if len(entry.keys() & {"frame", "frames", "pose"}) != 1:
         raise ValueError(
             "an object has either a frame, or several frames, in which it is detected, or a pose"
@@ -209,14 +215,7 @@ def _object(
         return obj, {**start, **given}, _frames(entry)
     if moves:
         raise ValueError("what can move needs a frame, in which it is detected")
-    return obj, {**_standing(entry), **given}, ()
-
-
-def _standing(entry: Mapping[str, Any]) -> Mapping[str, float]:
-    """Where an object stands that is not detected there."""
-    if "pose" not in entry:
-        raise ValueError("what opens needs a pose, at which its frame stands")
-    return pose_features(_pose(entry["pose"]))
+    return obj, {**pose_features(_pose(entry["pose"])), **given}, ()
 
 
 def _frames(entry: Mapping[str, Any]) -> Sequence[DetectedFrame]:
@@ -227,8 +226,8 @@ def _frames(entry: Mapping[str, Any]) -> Sequence[DetectedFrame]:
         return (DetectedFrame(str(entry["frame"]), Pose((x, y, z)), size),)
     if "offset" in entry:
         raise ValueError("offset belongs to frame; frames have a pose each")
-    if not entry.get("frames"):
-        raise ValueError("there is no frame: in which is the object, or what opens, detected?")
+    if not entry["frames"]:
+        raise ValueError("frames is empty: in which is the object detected?")
     return tuple(
         DetectedFrame(str(frame), _pose(numbers), size)
         for frame, numbers in entry["frames"].items()

@@ -329,8 +329,12 @@ def test_a_scene_file_says_where_furniture_stands_and_tags_how_far_it_is_open():
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ("    pose: [0.5, -0.1, 0, 0, 0, 0, 1]\n", "", "needs a pose"),
-        ("    frame: tag36h11:3\n    offset: [0.055, 0, -0.004]\n", "", "no frame"),
+        ("    pose: [0.5, -0.1, 0, 0, 0, 0, 1]\n", "", "what opens needs a pose"),
+        (
+            "    frame: tag36h11:3\n    offset: [0.055, 0, -0.004]\n",
+            "",
+            "either a frame, or several",
+        ),
         ("frame: tag36h11:3", "frame: tag36h11:1", "each tag is on one object"),
     ],
 )
