@@ -162,7 +162,7 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
     if settings.servo:
         passing = {"pace": settings.mujoco.get("pace", 1.0)}
-        servo = task | dict(BEFORE_MUJOCO_AT_A_BENCH) | passing | dict(settings.bridge)
+        servo = task | scene | dict(BEFORE_MUJOCO_AT_A_BENCH) | passing | dict(settings.bridge)
         pulled = {} if settings.mujoco.keys() & OF_JOINTS else dict(MUJOCO_AT_A_BENCH)
         robot = task | pulled | dict(settings.mujoco)
         return {"robot_bridge.mujoco": robot, "robot_bridge.servo": servo}

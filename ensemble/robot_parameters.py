@@ -65,6 +65,7 @@ class RobotParameters:
     """What a robot is, and how well it is measured: see the docstring of ``robot_bridge.node``."""
 
     arm: str = parameter("panda", "panda or fr3")
+    scene: str = parameter("", "a scene file; empty: the sampled task's objects")
     workspace: tuple[float, ...] = parameter(
         WORKSPACE, "m, fingertips, lowest x y z, highest", low=-10.0
     )
@@ -99,7 +100,6 @@ class RobotParameters:
 class PointToPointParameters(RobotParameters):
     """Those of a robot that moves from rest to rest, one goal of its controllers at a time."""
 
-    scene: str = parameter("", "a scene file; empty: the sampled task's objects")
     speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     hidden_after: int = parameter(

@@ -103,7 +103,7 @@ SHORTCUTS = ("shortcuts", "samples")
 TAKEN = {  # arguments that each node takes as its parameters
     "sim_node": (*TASK, "pace"),
     "robot_bridge": (*TASK, "arm", "scene", "speed"),
-    "servo_bridge": (*TASK, "arm"),
+    "servo_bridge": (*TASK, "arm", "scene"),
     "mock_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
     "mujoco_robot": (*TASK, "arm", "latency", "pose_noise", "dropout", "scene"),
     "franka_driver": (*TASK, "arm", "ip", "speed"),

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 from rclpy.node import Node
 from rclpy.task import Future
@@ -20,7 +19,7 @@ from slap_ros.errors import ControllerAbortedError, NoDetectionError, NoJointSta
 from slap_ros.relational import State
 from slap_ros.robot.gripper import GripperAction
 from slap_ros.robot.robot_world import RobotWorld
-from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
+from slap_ros.robot.scene_config import chosen_scene_config
 
 HELD_GAP = 0.002  # m between fingers that closed, above which there is something between them
 GAP_AGE = 0.1  # s, by which finger positions may be older than their stamp: drivers merge them
@@ -50,11 +49,7 @@ class Robot:
         """
         self._node, self._settings = node, settings
         self.clock = JumpFreeClock(node)
-        scene_config = (
-            read_scene_config(Path(settings.scene), domain)
-            if settings.scene
-            else sampled_scene_config(sampled())
-        )
+        scene_config = chosen_scene_config(settings.scene, domain, sampled)
         self.world = RobotWorld(domain, scene_config, settings.limits, settings.tracking)
         self.sensors = Sensors(node, self.world, settings, self.clock)
         self.controllers = Controllers(

@@ -116,19 +116,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
     Raises:
         SlapError: The domain, or what perceives it, cannot do what is asked for.
     """
-    goal, servo = _check_planning(options, domain, task), False
-    if options.world != SIM:
-        # Physics is needed only here: planar domains run without it.
-        from slap_ros.robot.servoed_robot import is_servoed, require_servoed
-        from slap_ros.robot.usable_domains import require_robot
-
-        servo = options.world == MUJOCO and is_servoed(domain)
-        if servo:
-            _require_frames(options)
-        (require_servoed if servo else require_robot)(domain, task.initial_state)
-    if options.world == MUJOCO:
-        require_mujoco()
-        _require_camera(options, domain)
+    goal, servo = _check_planning(options, domain, task), _check_world(options, domain, task)
     bridge, franka = _robot(options, servo)
     perception = parse_parameters(options.perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**perception).quality
@@ -203,16 +191,45 @@ def _robot(options: RunOptions, servo: bool) -> tuple[Parameters, Parameters]:
     return bridge, driver
 
 
-def _require_frames(options: RunOptions) -> None:
-    """Refuse another way to detect things than as the frames of a sampled task's objects.
+def _check_world(options: RunOptions, domain: Domain, task: Task) -> bool:
+    """Refuse a world in which the task cannot be carried out.
+
+    Returns:
+        Whether its robot is commanded while it moves.
 
     Raises:
-        InvalidParameterError: There is a scene file, or a camera.
+        SlapError: The domain has no such robot, or what perceives or simulates it is missing.
     """
-    if options.scene is not None or parse_mujoco_robot(options.mujoco).get("camera"):
+    if options.world == SIM:
+        return False
+    # Physics is needed only here: planar domains run without it.
+    from slap_ros.robot.scene_config import chosen_scene_config
+    from slap_ros.robot.servoed_robot import is_servoed, require_servoed
+    from slap_ros.robot.usable_domains import require_robot
+
+    servo = options.world == MUJOCO and is_servoed(domain)
+    if servo:
+        _require_frames(options)
+        scene = chosen_scene_config(str(options.scene or ""), domain, lambda: task.initial_state)
+        require_servoed(domain, scene)
+    else:
+        require_robot(domain, task.initial_state)
+    if options.world == MUJOCO:
+        require_mujoco()
+        _require_camera(options, domain)
+    return servo
+
+
+def _require_frames(options: RunOptions) -> None:
+    """Refuse to detect things at a bench by pictures.
+
+    Raises:
+        InvalidParameterError: There is a camera.
+    """
+    if parse_mujoco_robot(options.mujoco).get("camera"):
         raise InvalidParameterError(
-            f"{options.domain} has no scene files and no camera: its robot is commanded while it "
-            "moves, and detections must not wait until it stands"
+            f"{options.domain} has no camera: its robot is commanded while it moves, and "
+            "detections must not wait until it stands"
         )
 
 

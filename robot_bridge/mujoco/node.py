@@ -30,7 +30,8 @@ ROS Parameters:
     joint_noise (double, 0.0): rad, standard deviation of joint positions.
     dropout (double, 0.0): share of detections that are lost.
     rate (double, 30.0), joint_rate (double, 100.0): Hz, of detections and of joint positions.
-    hidden (string, ""): an object that is never detected.
+    hidden (string, ""): an object that is never detected; NAME_moving for the part of a drawer or
+        a lid that opens.
     pace (double, 1.0): how many times faster than a real one it moves.
     noise_seed (int, 0): noise and delays are a function of it.
     camera (bool, false): whether a camera with tags takes the place of exact frames.
@@ -48,7 +49,8 @@ Subscribers:
 
 Publishers:
     joint_states (sensor_msgs/JointState): of arm and fingers.
-    tf (tf2_msgs/TFMessage): objects, as frames detected_NAME; nothing where there is a camera.
+    tf (tf2_msgs/TFMessage): objects, as frames detected_NAME, and the part of a drawer or a lid
+        that opens, as detected_NAME_moving; nothing where there is a camera.
     camera/image_rect (sensor_msgs/Image), camera/image_rect/compressed
         (sensor_msgs/CompressedImage), camera/camera_info (sensor_msgs/CameraInfo): with a camera.
     tf_static (tf2_msgs/TFMessage): the camera's optical frame, camera_optical_frame.

@@ -12,8 +12,11 @@ well from the first failure of the sensors until ``slap/reset_task``.
 ROS Parameters:
     domain (string, "stack_at_target"): which domain; one of the contact world.
     preset (string, ""), skills (string, ""), libraries (string, "runs/skills"): as sim_node's.
-    seed (int, 0), index (int, 0), goal (string, ""): the task whose objects there are, in frames
-        detected_NAME; the goal as sim_node's.
+    seed (int, 0), index (int, 0), goal (string, ""): the task whose objects there are, unless a
+        scene says so; the goal as sim_node's.
+    scene (string, ""): a scene file; empty: the sampled task's objects, in frames detected_NAME.
+        Of a drawer or a lid, the part that opens is detected, as detected_NAME_moving; the rest
+        stands where the task has it.
     arm (string, "panda"): prefix of joints and frames.
     workspace (double[6], [0.2, -0.5, 0.0, 0.8, 0.5, 0.9]): lowest and highest x, y, z of the
         fingertips in m, base frame.
@@ -75,7 +78,7 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_goal
 from slap_ros.relational import State
-from slap_ros.robot.scene_config import sampled_scene_config
+from slap_ros.robot.scene_config import chosen_scene_config
 from slap_ros.robot.servoed_robot import ServoedRobot
 
 POLL_PERIOD = 0.005  # s, between two looks at what is measured
@@ -104,10 +107,14 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("servo_bridge", ServoBridgeParameters, **kwargs)
         settings = self._settings
-        task = settings.first_task(self._domain)
+        scene_config = chosen_scene_config(
+            settings.scene,
+            self._domain,
+            lambda: settings.first_task(self._domain).initial_state,
+        )
         self._robot = ServoedRobot(
             self._domain,
-            sampled_scene_config(task.initial_state),
+            scene_config,
             settings.space,
             settings.tracking,
             settings.pace,

@@ -6,13 +6,15 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Object
 from slap_ros.robot.line_of_sight import Ways, is_slanted
-from slap_ros.robot.scene_config import SceneConfig
+from slap_ros.robot.opening_sensor import OpeningSensor
+from slap_ros.robot.scene_config import DetectedFrame, SceneConfig
 from slap_ros.robot.tracking import LONGEST, Detection, Track, TrackingSettings, measured_pose
 
 FARTHEST = 10.0  # m, from the base; what is detected further away is in another unit
@@ -26,6 +28,7 @@ class DetectedObjects:
         scene_config: SceneConfig,
         tracking: TrackingSettings,
         in_hand: Callable[[Object], Pose | None],
+        openings: Mapping[Object, OpeningSensor] = MappingProxyType({}),
     ) -> None:
         """Know of no detection yet.
 
@@ -34,13 +37,16 @@ class DetectedObjects:
             tracking: Settings of how far detections can be trusted.
             in_hand: Function that says where the hand has an object; None where it does not hold
                 it, or nothing was measured yet.
+            openings: Objects of which a part slides or turns, and how that is measured: their
+                tracks are those of these parts.
         """
         self.tracks = {obj: Track(tracking) for obj in scene_config.detected}
         self._frames = {
             how.frame: (obj, how) for obj, frames in scene_config.detected.items() for how in frames
         }
         self._pictures: deque[float] = deque(maxlen=LONGEST)  # stamps, each once
-        self._in_hand = in_hand
+        self._in_hand, self._openings = in_hand, openings
+        self.refusals: dict[Object, InvalidMeasurementError] = {}  # since the last good detection
 
     @property
     def has_pictures(self) -> bool:
@@ -58,11 +64,20 @@ class DetectedObjects:
 
         Raises:
             InvalidMeasurementError: Not finite, no pose, further away than anything a robot works
-                with, or not newer than the last one.
+                with, beside the way of what slides or turns, or not newer than the last one.
         """
         if frame not in self._frames:
             return
         obj, how = self._frames[frame]
+        try:
+            self._add(obj, how, stamp_s, base, seen)
+        except InvalidMeasurementError as error:
+            self.refusals[obj] = error
+            raise
+        self.refusals.pop(obj, None)
+        self.add_picture(stamp_s)
+
+    def _add(self, obj: Object, how: DetectedFrame, stamp_s: float, base: Pose, seen: Pose) -> None:
         found, is_tag = measured_pose(*seen), how.tag_size is not None
         pose = base.compose(found).compose(how.offset)
         if math.hypot(*pose.position) > FARTHEST:
@@ -70,12 +85,13 @@ class DetectedObjects:
                 f"{obj.name} is detected {math.hypot(*pose.position):.6g} m away from the robot: "
                 "are positions in m?"
             )
+        if obj in self._openings:
+            self._openings[obj].require_on_path(pose)
         if not is_tag:
-            self.tracks[obj].add(Detection(stamp_s, pose, frame))
+            self.tracks[obj].add(Detection(stamp_s, pose, how.frame))
         elif not is_slanted(found):
             pose = self._likelier(obj, Ways.of(base, found, how.offset))
-            self.tracks[obj].add(Detection(stamp_s, pose, frame, base.position))
-        self.add_picture(stamp_s)
+            self.tracks[obj].add(Detection(stamp_s, pose, how.frame, base.position))
 
     def add_picture(self, stamp_s: float) -> None:
         """Take that a picture was searched: what none of several shows is hidden.

@@ -22,11 +22,20 @@ first block is the target block)::
         type: surface
         pose: [0.5, 0, -0.175, 0, 0, 0, 1]   # m and quaternion x y z w, in the base's frame
         features: {half_x: 0.25, ...}
+
+At a bench, what opens has both: the pose at which it stands, and the frame of the part that opens::
+
+      cabinet0:
+        type: cabinet
+        pose: [0.47, 0.35, 0, 0, 0, 0.707107, 0.707107]
+        frames:  # the frame of that part in the tag's: here upright on the drawer's front
+          tag36h11:4: [0, -0.045, 0, 0, 0.707107, 0.707107, 0]
+        features: {support_height: 0.04}
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,9 +46,14 @@ from slap_ros.files import parse_yaml, read_text
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.relational import Object, State
 from slap_ros.robot.tracking import measured_pose
+from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
+from slap_ros.worlds.contact.features import opening_features
+from slap_ros.worlds.contact.features import robot_features as hand_features
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.links import MOVING
 from slap_ros.worlds.features import body_features, pose_features
 from slap_ros.worlds.joint_space.features import ROBOT, robot_features
-from slap_ros.worlds.panda import HOME
+from slap_ros.worlds.panda import HOME, grasp_pose
 
 MAX_SCENE_BYTES = 2**20
 DETECTED = "detected_"  # prefix of detection frames where no scene file names them
@@ -60,7 +74,8 @@ class DetectedFrame:
     """How an object is detected."""
 
     frame: str  # child frame in TF
-    offset: Pose = IDENTITY  # of the object's middle, in the detected frame
+    # Of the object's middle, or of the frame of its part that opens, in the detected frame.
+    offset: Pose = IDENTITY
     tag_size: float | None = None  # m, edge of a tag's black square; None: not said
 
 
@@ -92,9 +107,33 @@ class SceneConfig:
 
 
 def sampled_scene_config(initial: State) -> SceneConfig:
-    """The scene of a sampled task: what can move is detected, the rest is where the task has it."""
-    movable = [o for o in initial.objects if "held" in {f.name for f in o.type.features}]
-    return SceneConfig(initial, {o: (DetectedFrame(f"{DETECTED}{o.name}"),) for o in movable})
+    """The scene of a sampled task: what can move is detected, the rest is where the task has it.
+
+    Of a drawer or a lid, the part that opens is detected, in a frame of that part's own name.
+    """
+    names = {o: o.name for o in initial.objects if _has(o, "held")}
+    names |= {o: f"{o.name}{MOVING}" for o in initial.objects if _has(o, "opening")}
+    return SceneConfig(
+        initial, {o: (DetectedFrame(f"{DETECTED}{name}"),) for o, name in names.items()}
+    )
+
+
+def _has(obj: Object, feature: str) -> bool:
+    return feature in obj.type.column
+
+
+def chosen_scene_config(path: str, domain: Domain, sampled: Callable[[], State]) -> SceneConfig:
+    """The scene of a scene file; where none is named, that of a sampled task.
+
+    Args:
+        path: Path of the scene file; empty: none.
+        domain: Domain of the objects.
+        sampled: Gives the state of a task, whose objects there are where there is no file.
+
+    Raises:
+        InvalidSceneError: The file is missing or malformed, or its objects are not the domain's.
+    """
+    return read_scene_config(Path(path), domain) if path else sampled_scene_config(sampled())
 
 
 def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
@@ -123,7 +162,8 @@ def scene_config(content: object, path: str, domain: Domain) -> SceneConfig:
     """
     if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
         raise InvalidSceneError(f"scene file {path} has no mapping `objects`")
-    features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
+    robot, at_home = _robot(domain)
+    features: dict[Object, Mapping[str, float]] = {robot: at_home}
     detected: dict[Object, Sequence[DetectedFrame]] = {}
     for name, entry in content["objects"].items():
         parked = Pose((PARKED + len(features), 0.0, 0.0))
@@ -140,6 +180,13 @@ def scene_config(content: object, path: str, domain: Domain) -> SceneConfig:
         raise InvalidSceneError(f"scene file {path}: {error}") from error
 
 
+def _robot(domain: Domain) -> tuple[Object, Mapping[str, float]]:
+    """The robot as it is before anything is measured."""
+    if HAND_OF_FORCES in domain.types:
+        return HAND_OF_FORCES("robot"), hand_features(hand_at(grasp_pose(HOME).position))
+    return ROBOT("robot"), robot_features(HOME)
+
+
 def _object(
     name: str, entry: Mapping[str, Any], domain: Domain, parked: Pose
 ) -> tuple[Object, Mapping[str, float], Sequence[DetectedFrame]]:
@@ -148,13 +195,21 @@ def _object(
     kinds = domain.types_by_name
     if entry.get("type") not in kinds:
         raise ValueError(f"unknown type {entry.get('type')!r}; there are {', '.join(kinds)}")
+    given = {str(k): float(v) for k, v in entry.get("features", {}).items()}
+    obj = kinds[entry["type"]](name)
+    if _has(obj, "opening"):
+        if "pose" not in entry or len(entry.keys() & {"frame", "frames"}) != 1:
+            raise ValueError(
+                "what opens needs a pose, at which it stands, and either a frame, or several "
+                "frames, in which its part that opens is detected"
+            )
+        shut = {**pose_features(_pose(entry["pose"])), **opening_features(0.0)}
+        return obj, {**shut, **given}, _frames(entry)
     if len(entry.keys() & {"frame", "frames", "pose"}) != 1:
         raise ValueError(
             "an object has either a frame, or several frames, in which it is detected, or a pose"
         )
-    given = {str(k): float(v) for k, v in entry.get("features", {}).items()}
-    obj = kinds[entry["type"]](name)
-    moves = "held" in {feature.name for feature in obj.type.features}
+    moves = _has(obj, "held")
     if "pose" not in entry:
         start = body_features(parked.position) if moves else pose_features(parked)
         return obj, {**start, **given}, _frames(entry)

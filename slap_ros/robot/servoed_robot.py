@@ -4,7 +4,8 @@
 
 A state of the contact world has velocities, what is held, and where the hand was told to be. The
 joints give the hand's velocity. Things that are detected in one place are at rest there; others
-move as their last detections do. What is between fingers that were told to close and stand is held:
+move as their last detections do, and so does what slides or turns of a drawer or a lid, which says
+how far that is open. What is between fingers that were told to close and stand is held:
 it goes with the hand, for detections are older than encoders. And what was told is known.
 """
 
@@ -28,15 +29,17 @@ from slap_ros.relational import Object, State
 from slap_ros.robot.detected_objects import DetectedObjects
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import Joints, Workspace
+from slap_ros.robot.opening_sensor import OpeningSensor
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.servoing import HandServo, ServoCommand, moving_hand
 from slap_ros.robot.state_assembly import possible_joints
-from slap_ros.robot.tracking import TrackingSettings
+from slap_ros.robot.tracking import Track, TrackingSettings
 from slap_ros.worlds.contact.command import HandCommand
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.hand import PAD, HandState
-from slap_ros.worlds.contact.snapshot import ContactIndex
-from slap_ros.worlds.contact.validation import GRASP_GAP
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot, Opening
+from slap_ros.worlds.contact.validation import GRASP_GAP, require_possible_bodies
 from slap_ros.worlds.contact.world import ContactWorld
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN, grasp_pose
@@ -53,40 +56,52 @@ def is_servoed(domain: Domain) -> bool:
     return ROBOT in domain.types
 
 
-def require_servoed(domain: Domain, initial: State) -> None:
+def require_servoed(domain: Domain, scene_config: SceneConfig) -> None:
     """Refuse what a robot that is commanded while it moves cannot do, before anything is started.
 
     Args:
         domain: Domain whose hand acts by forces.
-        initial: State of a task.
+        scene_config: Objects of the scene, and how they are detected.
 
     Raises:
         InvalidParameterError: Its world is disturbed on purpose.
-        InvalidSceneError: A body has a part that slides or turns.
+        InvalidSceneError: Something that moves is not detected.
     """
     if domain.make_model is not None:
         raise InvalidParameterError(
             f"{domain} has disturbances of its own, which only a simulation can have; use another "
             "preset, or --world sim"
         )
-    _contact_model(domain, initial).close()
+    _contact_model(domain, scene_config).close()
 
 
-def _contact_model(domain: Domain, state: State) -> ContactWorld:
+def _contact_model(domain: Domain, scene_config: SceneConfig) -> ContactWorld:
     """The planner's world, where everything that moves is detected.
 
     Raises:
-        InvalidSceneError: A body has a part that slides or turns.
+        InvalidSceneError: Something that moves is not detected, or something else is.
     """
-    model = domain.make_world(state)
+    model = domain.make_world(scene_config.template)
     assert isinstance(model, ContactWorld)
-    if jointed := model.scene.jointed:
+    try:
+        _require_detected(model.scene, scene_config)
+    except InvalidSceneError:
         model.close()
-        raise InvalidSceneError(
-            f"{domain.name} cannot run on a robot: nothing measures how far {jointed[0].name} is "
-            f"open; use --world sim, or `slap study closed_loop {domain.name}`, which knows it"
-        )
+        raise
     return model
+
+
+def _require_detected(scene: ContactScene, scene_config: SceneConfig) -> None:
+    """Refuse a scene unless that is detected which moves, and nothing else."""
+    detected = {obj.name for obj in scene_config.detected}
+    moving = {body.name: "where it is" for body in scene.free}
+    moving |= {body.name: "how far it is open" for body in scene.jointed}
+    for name in sorted(moving.keys() - detected):
+        raise InvalidSceneError(
+            f"{name} needs a frame in which it is detected: nothing else measures {moving[name]}"
+        )
+    for name in sorted(detected - moving.keys()):
+        raise InvalidSceneError(f"{name} does not move: it needs a pose, and not a frame")
 
 
 class ServoedRobot:
@@ -101,7 +116,7 @@ class ServoedRobot:
 
     Raises:
         InvalidParameterError: The domain has another robot.
-        InvalidSceneError: A body has a part that slides or turns.
+        InvalidSceneError: Something that moves is not detected.
     """
 
     def __init__(
@@ -116,9 +131,15 @@ class ServoedRobot:
             raise InvalidParameterError(f"{domain.name} has no hand that acts by forces")
         self.domain, self._workspace, self._pace = domain, workspace, pace
         self._template = scene_config.template
-        self._model = _contact_model(domain, self._template)
-        self._index = ContactIndex.of(self._model.scene, self._template.layout)
-        self._detected = DetectedObjects(scene_config, tracking, lambda _: None)
+        self._model = _contact_model(domain, scene_config)
+        scene = self._model.scene
+        self._index = ContactIndex.of(scene, self._template.layout)
+        self._placement = self._index.placement(scene, self._template)
+        self._openings = {
+            self._object(body.name): OpeningSensor(body, pose)
+            for body, pose in zip(scene.jointed, self._placement.jointed, strict=True)
+        }
+        self._detected = DetectedObjects(scene_config, tracking, lambda _: None, self._openings)
         self._readings: deque[JointReading] = deque(maxlen=REMEMBERED)
         self._servo: HandServo | None = None
         self._state: State | None = None  # measured last
@@ -135,7 +156,8 @@ class ServoedRobot:
             seen: Pose of the child frame in its parent.
 
         Raises:
-            InvalidMeasurementError: It cannot be, or is not newer than the last one.
+            InvalidMeasurementError: It cannot be, as beside the way of a drawer, or is not newer
+                than the last one.
         """
         self._detected.add(frame, stamp_s * self._pace, base, seen)
 
@@ -164,10 +186,14 @@ class ServoedRobot:
         return bool(self._readings) and not self._readings[-1].at_rest
 
     def undetected(self, since_s: float) -> list[str]:
-        """Names of the objects that were not detected since a time, s."""
-        return [
-            o.name for o, t in self._detected.tracks.items() if t.newest_s <= since_s * self._pace
-        ]
+        """Names of the objects that were not detected since a time, s.
+
+        Where detections of one come and are refused, its name is followed by the reason.
+        """
+        detected = self._detected
+        unseen = [o for o, t in detected.tracks.items() if t.newest_s <= since_s * self._pace]
+        refused = detected.refusals
+        return [f"{o.name} ({refused[o]})" if o in refused else o.name for o in unseen]
 
     # -- states ---------------------------------------------------------------------------------
 
@@ -190,6 +216,7 @@ class ServoedRobot:
         stay = HandCommand.to_stay(grasp_pose(possible_joints(newest.joints)), closing)
         state = self._assembled(since_s, stay)
         if state is not None:
+            self._model.reset(self.domain.execution.clear(state))  # plans begin here
             self._servo = HandServo(self._index, state, self._workspace)
         return state
 
@@ -211,18 +238,16 @@ class ServoedRobot:
         if self.newest_joints_s <= since_s or len(self._readings) < 2:
             return None
         hand, joints = self._hand(told)
-        motions = [self._motion(body.name) for body in self._model.scene.free]
-        bodies = tuple(motion for motion in motions if motion is not None)
-        if len(bodies) < len(motions):
+        bodies, openings = self._bodies(), self._measured_openings()
+        if bodies is None or openings is None:
             return None
         held = self._held(hand)
         if held is not None:
             bodies = (*bodies[:held], self._carried(held, hand), *bodies[held + 1 :])
-        snapshot = self._index.read(self._template)
-        state = self._index.write(
-            self._template, snapshot._replace(joints=joints, hand=hand, bodies=bodies, held=held)
-        )
-        self._model.reset(self.domain.execution.clear(state))
+        snapshot = ContactSnapshot(joints, hand, bodies, openings, held)
+        state = self._index.write(self._template, snapshot)
+        state.require_finite()
+        require_possible_bodies(self._model.scene, snapshot, self._placement)
         self._state = state
         return state
 
@@ -245,10 +270,23 @@ class ServoedRobot:
         before = [one for one in list(self._readings)[:-1] if one.stamp_s <= stamp_s]
         return before[-1] if before else self._readings[0]
 
-    def _motion(self, name: str) -> BodyState | None:
-        """How a body lies or moves; None as long as it was not detected often enough."""
-        found = self._detected.tracks[self._object(name)].newest_motion()
-        return None if found is None else BodyState(found.pose, found.velocity, found.spin)
+    def _bodies(self) -> tuple[BodyState, ...] | None:
+        """How bodies lie or move; None as long as one was not detected often enough."""
+        tracks = [self._track(body.name) for body in self._model.scene.free]
+        found = [motion for track in tracks if (motion := track.newest_motion()) is not None]
+        if len(found) < len(tracks):
+            return None
+        return tuple(BodyState(one.pose, one.velocity, one.spin) for one in found)
+
+    def _measured_openings(self) -> tuple[Opening, ...] | None:
+        """How far drawers and lids are open; None as long as one was not detected often enough."""
+        found = []
+        for obj, sensor in self._openings.items():
+            motion = self._detected.tracks[obj].newest_motion()
+            if motion is None:
+                return None
+            found.append(sensor.opening(motion))
+        return tuple(found)
 
     def _held(self, hand: HandState) -> int | None:
         """Index of the body that fingers stand around which were told to close."""
@@ -264,13 +302,16 @@ class ServoedRobot:
 
     def _carried(self, index: int, hand: HandState) -> BodyState:
         """A body that has gone with the hand since it was detected."""
-        seen = self._detected.tracks[self._object(self._model.scene.free[index].name)].newest
+        seen = self._track(self._model.scene.free[index].name).newest
         then = grasp_pose(self._reading_at(seen.stamp_s).joints)
         pose = hand.pose.compose(then.inverse().compose(seen.pose))
         (x, y, z), (px, py, pz) = hand.pose.position, pose.position
         turned = cross(hand.angular_velocity, (px - x, py - y, pz - z))
         vx, vy, vz = (a + b for a, b in zip(hand.velocity, turned, strict=True))
         return BodyState(pose, (vx, vy, vz), hand.angular_velocity)
+
+    def _track(self, name: str) -> Track:
+        return self._detected.tracks[self._object(name)]
 
     def _object(self, name: str) -> Object:
         return self._template.layout.object(name)

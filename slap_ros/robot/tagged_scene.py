@@ -124,7 +124,10 @@ def tagged_scene(domain: Domain, state: State) -> str:
 def _boxes(domain: Domain, state: State) -> Mapping[str, Box]:
     world = domain.make_world(state)
     if not isinstance(world, PandaWorld):
-        raise InvalidSceneError(f"{domain.name} has no Panda, and so no scene file")
+        raise InvalidSceneError(
+            f"{domain.name} has no boxes around a Panda, and so no tags on their faces; the scene "
+            "file of a domain at a bench is written by hand"
+        )
     with world:
         return {body.name: body for body in world.scene.free if isinstance(body, Box)}
 

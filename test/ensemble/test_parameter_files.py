@@ -101,9 +101,10 @@ def test_a_launched_simulated_fr3_has_the_parameters_of_a_started_one():
 
 def test_a_launched_robot_at_a_bench_has_the_parameters_of_a_started_one():
     chosen = DomainChoice("stack_at_target", "fair")
-    settings = RunSettings(chosen, 1, 0, "lazy", None, world="mujoco", servo=True)
+    settings = RunSettings(chosen, 1, 0, "lazy", None, world="mujoco", servo=True, scene="my.yaml")
     launched, started = blocks("servo.yaml"), node_parameters(settings)
     for name, node in (("servo_bridge", "servo"), ("mujoco_robot", "mujoco")):
         given = {key: as_default(value) for key, value in launched[name].items()}
         assert given.items() <= started[f"robot_bridge.{node}"].items()
     assert launched["servo_bridge"]["gripper_effort"] == HandModel().grip_n
+    assert started["robot_bridge.servo"]["scene"] == "my.yaml"

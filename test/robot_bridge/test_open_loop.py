@@ -122,11 +122,12 @@ def test_what_stands_or_lies_at_a_bench_stays_there(name):
     state = get_domain(name).task(2).initial_state
     plant = MujocoPlant.of(get_domain(name), state)
     placed = {
-        o: [float(state.get(state.layout.object(o), a)) for a in "xyz"] for o in plant.poses()
+        o: [float(state.get(state.layout.object(o), a)) for a in "xyz"] for o in plant.motions()
     }
     for _ in range(round(2.0 / PERIOD_S)):
         plant.step()
-    assert all(math.dist(placed[o], pose.position) < 0.002 for o, pose in plant.poses().items())
+    for thing, motion in plant.motions().items():
+        assert math.dist(placed[thing], motion.pose.position) < 0.002
     assert plant.grasped() is None
     assert all(np.linalg.norm(motion.velocity) < 0.01 for motion in plant.motions().values())
 

@@ -3,9 +3,11 @@
 """States at a bench from encoders and late detections, while the arm moves."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import (
@@ -21,7 +23,7 @@ from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import Workspace
-from slap_ros.robot.scene_config import sampled_scene_config
+from slap_ros.robot.scene_config import DetectedFrame, sampled_scene_config, scene_config
 from slap_ros.robot.servoed_robot import ServoedRobot, require_servoed
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
@@ -30,6 +32,7 @@ from slap_ros.worlds.contact.clearing import DEEPEST
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.hand import PAD, hand_at
 from slap_ros.worlds.contact.validation import OVERLAP
+from slap_ros.worlds.features import pose_of
 from slap_ros.worlds.panda import FINGER_OPEN
 
 pytest.importorskip("pybullet")
@@ -165,6 +168,29 @@ def test_a_thing_has_the_velocity_of_its_last_detections(domain):
     assert float(moved.get(cube, "y")) == pytest.approx(y - 0.03)
 
 
+def test_things_inside_one_another_are_no_state_and_a_hand_inside_one_is_where_encoders_say(domain):
+    """Real fingers are narrower than the planner's: a skill goes on, but no task begins there."""
+    world = MeasuredPlant(domain)
+    robot, began_s = world.robot, world.now_s
+    (hand,) = world.state.layout.of_type(ROBOT)
+    x, y, z = (float(world.state.get(hand, axis)) for axis in "xyz")
+    other = world.plant.poses()["cube1"]
+
+    def seen_at(pose, after_s):
+        for i in range(1, 4):
+            for name, at in (("cube0", pose), ("cube1", other)):
+                robot.add_detection(f"detected_{name}", began_s + after_s + i, IDENTITY, at)
+
+    seen_at(Pose((x, y, z + 0.1)), 0.0)
+    state = robot.measure(-math.inf)
+    assert float(state.get(state.layout.object("cube0"), "z")) == pytest.approx(z + 0.1)
+    with pytest.raises(InvalidStateError, match="the hand and cube0 are inside one another"):
+        robot.begin(-math.inf)
+    seen_at(other, 3.0)
+    with pytest.raises(InvalidStateError, match="cube1 and cube0 are inside one another"):
+        robot.measure(-math.inf)
+
+
 def test_time_that_passes_faster_is_taken_into_account(domain):
     velocities = []
     for pace in (1.0, 5.0):
@@ -233,12 +259,129 @@ def test_a_hand_that_plans_can_be_cleared_of_a_table_is_measured(domain):
                 robot.begin(0.0)
 
 
-def test_where_something_slides_or_there_is_no_hand_is_named():
+def test_a_drawer_is_as_far_open_as_its_front_is_seen():
+    """Nothing but detections says so: the state that the task began in has both shut."""
+    world = MeasuredPlant(get_domain("stow_hammer"))
+    pulled, other = (world.state.layout.object(f"cabinet{i}") for i in range(2))
+    axis = world.plant._data.xaxis[world.plant._model.joint("cabinet0").id]
+    front = world.plant._model.body("cabinet0_moving").id
+    world.plant._data.xfrc_applied[front][:3] = 11.0 * axis  # N, little more than its friction
+    rates = []
+    for _ in range(16):
+        state, true = world.step(np.zeros(5)), world.plant.openings()["cabinet0"]
+        late = 0.1 * abs(true.velocity) + 1e-3  # m: of two periods of detections, and their delay
+        assert float(state.get(pulled, "opening")) == pytest.approx(true.position, abs=late)
+        assert state.get(other, "opening") == pytest.approx(0.0, abs=1e-6)
+        rates.append((float(state.get(pulled, "opening_velocity")), true.velocity))
+    assert float(state.get(pulled, "opening")) > 0.05
+    fastest = max(rates, key=lambda pair: pair[0])
+    assert fastest[0] > 0.1 and fastest[0] == pytest.approx(fastest[1], rel=0.2)
+    world.plant._data.xfrc_applied[front][:3] = 0.0
+    for _ in range(6):
+        state = world.step(np.zeros(5))
+    assert float(state.get(pulled, "opening_velocity")) == 0.0
+    at_rest = world.plant.openings()["cabinet0"].position
+    assert float(state.get(pulled, "opening")) == pytest.approx(at_rest, abs=1e-6)
+
+
+def test_a_front_that_is_seen_elsewhere_is_refused_and_named():
+    """As where somebody has put the tag of one drawer on the other."""
+    domain = get_domain("stow_hammer")
+    initial = domain.task(SEED).initial_state
+    robot = ServoedRobot(domain, sampled_scene_config(initial), REACH, EXACT)
+    poses = MujocoPlant.of(domain, initial).poses()
+    swapped = {"cabinet0_moving": "cabinet1_moving"}
+    for name in poses:
+        seen = poses[swapped.get(name, name)]
+        if name in swapped:
+            with pytest.raises(InvalidMeasurementError, match=r"cabinet0 .* another thing"):
+                robot.add_detection(f"detected_{name}", 1.0, IDENTITY, seen)
+        else:
+            robot.add_detection(f"detected_{name}", 1.0, IDENTITY, seen)
+    (missing,) = robot.undetected(0.0)
+    assert missing.startswith("cabinet0 (") and "away from where its joint" in missing
+    robot.add_detection("detected_cabinet0_moving", 1.1, IDENTITY, poses["cabinet0_moving"])
+    assert not robot.undetected(0.0)
+
+
+COFFEE = """
+objects:
+  pod:
+    type: pod
+    frame: tag36h11:1
+    offset: [0, 0, -0.025]
+    features: {support_height: 0.025, rest_height: 0.025}
+  cabinet:
+    type: cabinet
+    pose: [0.45, 0.35, 0, 0, 0, 0.707107, 0.707107]
+    frames: {tag36h11:2: [0, -0.045, 0, 0, 0.707107, 0.707107, 0]}
+    features: {support_height: 0.04}
+  holder:
+    type: holder
+    pose: [0.5, -0.1, 0, 0, 0, 0, 1]
+    frame: tag36h11:3
+    offset: [0.055, 0, -0.004]
+    features: {support_height: 0.01}
+"""
+COFFEE_DOMAIN = get_domain("make_coffee")
+FRONT, LID = (0.0, 0.0, 0.045), (-0.055, 0.0, 0.004)  # m, of the tags in the frames of what opens
+
+
+def test_a_scene_file_says_where_furniture_stands_and_tags_how_far_it_is_open():
+    config = scene_config(yaml.safe_load(COFFEE), "here", COFFEE_DOMAIN)
+    robot = ServoedRobot(COFFEE_DOMAIN, config, REACH, EXACT)
+    upright = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
+    with COFFEE_DOMAIN.make_world(config.template) as world:
+        scene = world.scene
+    cabinet, holder = (jointed.joint for jointed in scene.jointed)
+    frames = [
+        pose_of(config.template, config.template.layout.object(b.name)) for b in scene.jointed
+    ]
+    front = frames[0].compose(cabinet.moved(0.1)).compose(Pose(FRONT, upright))
+    lid = frames[1].compose(holder.moved(1.2)).compose(Pose(LID))
+    seen = {1: Pose((0.4, 0.0, 0.05)), 2: front, 3: lid}
+    joints = (0.0, -0.186, 0.0, -1.837, 0.0, 1.651, math.pi / 4)
+    for i in range(1, 5):
+        for tag, pose in seen.items():
+            robot.add_detection(f"tag36h11:{tag}", 0.1 * i, IDENTITY, pose)
+        robot.add_joint_reading(JointReading(0.1 * i, joints, (0.0,) * 7, 0.08))
+    state = robot.begin(0.0)
+    openings = [float(state.get(state.layout.object(n), "opening")) for n in ("cabinet", "holder")]
+    assert openings == pytest.approx([0.1, 1.2], abs=1e-6)
+    assert float(state.get(state.layout.object("pod"), "z")) == pytest.approx(0.025)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("    pose: [0.5, -0.1, 0, 0, 0, 0, 1]\n", "", "what opens needs a pose"),
+        (
+            "    frame: tag36h11:3\n    offset: [0.055, 0, -0.004]\n",
+            "",
+            "either a frame, or several",
+        ),
+        ("frame: tag36h11:3", "frame: tag36h11:1", "each tag is on one object"),
+    ],
+)
+def test_furniture_with_a_mistake_in_the_scene_file_is_refused(before, after, words):
+    assert before in COFFEE
+    with pytest.raises(InvalidSceneError, match=words):
+        scene_config(yaml.safe_load(COFFEE.replace(before, after)), "here", COFFEE_DOMAIN)
+
+
+def test_what_moves_and_is_not_detected_or_has_no_hand_is_named():
     drawers = get_domain("stow_hammer")
-    state = drawers.task(1).initial_state
-    with pytest.raises(InvalidSceneError, match="how far cabinet0 is open"):
-        require_servoed(drawers, state)
+    config = sampled_scene_config(drawers.task(1).initial_state)
+    for name, what in (("cabinet0", "how far it is open"), ("hammer1", "where it is")):
+        seen = {obj: frames for obj, frames in config.detected.items() if obj.name != name}
+        with pytest.raises(InvalidSceneError, match=rf"{name} needs .* else measures {what}"):
+            require_servoed(drawers, replace(config, detected=seen))
+    stack = get_domain("stack_at_target")
+    config = sampled_scene_config(stack.task(1).initial_state)
+    target = {config.template.layout.object("target0"): (DetectedFrame("tag36h11:9"),)}
+    with pytest.raises(InvalidSceneError, match="target0 does not move: it needs a pose"):
+        require_servoed(stack, replace(config, detected={**config.detected, **target}))
     tower = get_domain("obstacle_tower")
-    config = sampled_scene_config(tower.task(1).initial_state)
+    scene = sampled_scene_config(tower.task(1).initial_state)
     with pytest.raises(InvalidParameterError, match="no hand that acts by forces"):
-        ServoedRobot(tower, config, REACH, EXACT)
+        ServoedRobot(tower, scene, REACH, EXACT)

@@ -113,10 +113,10 @@ class OpenLoopPlayer:
         """Note how what the recording holds lies in the hand."""
         state, hand = self._recorded.states[step], grasp_pose(self.plant.joints)
         (robot,) = state.layout.of_type(ROBOT)
-        for name, pose in self.plant.poses().items():
+        for name, motion in self.plant.motions().items():
             thing = state.layout.object(name)
             if state.get(thing, "held") > 0.5:
-                here = hand.inverse().compose(pose)
+                here = hand.inverse().compose(motion.pose)
                 there = pose_of(state, robot).inverse().compose(pose_of(state, thing))
                 self.grasps.append(
                     GraspDeviation(

@@ -31,6 +31,7 @@ from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.placed_scene import PandaScene, PlacedScene
 from slap_ros.worlds.contact.contacts import ContactPoint, Side, Surface, grasped
+from slap_ros.worlds.contact.links import MOVING
 from slap_ros.worlds.contact.snapshot import Opening
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINTS, grasp_pose
@@ -75,6 +76,9 @@ class MujocoPlant:
         self._surfaces = {model.body(name).id: one for name, one in (FINGERS | free).items()}
         begun = PlacedScene.of(scene, state)
         self._openings = [model.joint(jointed.body.name) for jointed in begun.jointed]
+        moving = [f"{jointed.body.name}{MOVING}" for jointed in begun.jointed]
+        self._parts = dict(zip(self._names, self._bodies, strict=True))
+        self._parts |= {name: model.body(name).id for name in moving}
         self._data.qpos[self._arm_at] = begun.joints
         self._data.qpos[self._fingers_at] = begun.fingers
         for joint, jointed in zip(self._openings, begun.jointed, strict=True):
@@ -149,21 +153,21 @@ class MujocoPlant:
         return bool(np.abs(self._data.qvel).max() < RESTING)
 
     def poses(self) -> dict[str, Pose]:
-        """Where what can move is, by name."""
-        return {
-            name: _pose(self._data.xpos[body], self._data.xquat[body])
-            for name, body in zip(self._names, self._bodies, strict=True)
-        }
+        """Where what can move is, by name: free bodies, then what slides or turns of others."""
+        return {name: self._pose_of(body) for name, body in self._parts.items()}
 
     def motions(self) -> dict[str, BodyState]:
-        """Where what can move is, and how fast, by name."""
+        """Where free bodies are, and how fast, by name."""
         found, velocity = {}, np.zeros(6)
-        for (name, pose), body in zip(self.poses().items(), self._bodies, strict=True):
+        for name, body in zip(self._names, self._bodies, strict=True):
             kind = mujoco.mjtObj.mjOBJ_BODY
             mujoco.mj_objectVelocity(self._model, self._data, kind, body, velocity, 0)
             spin, speed = _vector(velocity[:3]), _vector(velocity[3:])
-            found[name] = BodyState(pose, speed, spin)
+            found[name] = BodyState(self._pose_of(body), speed, spin)
         return found
+
+    def _pose_of(self, body: int) -> Pose:
+        return _pose(self._data.xpos[body], self._data.xquat[body])
 
     def openings(self) -> dict[str, Opening]:
         """How far jointed bodies are open, and how fast they open, by name."""

@@ -19,6 +19,7 @@ from slap_ros.geometry.pose import (
     Vector,
     conjugate,
     cross,
+    dot,
     from_rotation_vector,
     from_yaw,
     rotate,
@@ -194,6 +195,21 @@ class Joint:
         way = (opening * x, opening * y, opening * z)
         slides = self.kind is JointKind.SLIDE
         return self.mount.compose(Pose(way) if slides else Pose(ORIGIN, from_rotation_vector(way)))
+
+    def opening_at(self, moved: Pose) -> float:
+        """The opening at which the moving part is nearest to a pose: what :meth:`moved` undoes.
+
+        Args:
+            moved: Pose of the moving part's frame in the body's.
+
+        Returns:
+            m, or rad within half a turn of the middle of the range; outside the range as well.
+        """
+        position, (x, y, z, w) = self.mount.inverse().compose(moved)
+        if self.kind is JointKind.SLIDE:
+            return dot(self.axis, position)
+        turn, middle = 2.0 * math.atan2(dot(self.axis, (x, y, z)), w), 0.5 * self.high
+        return middle + math.remainder(turn - middle, math.tau)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -27,7 +27,7 @@ FAST = 20.0  # m/s: nothing becomes that fast
 FAST_SPIN = 500.0  # rad/s
 GRASP_GAP = 0.003  # m, at most, between a pad and what is held
 
-NamedBoxes = tuple[str, tuple[OrientedBox, ...]]  # inside a body, with its name
+NamedBoxes = tuple[str, Sequence[OrientedBox]]  # inside a body, with its name
 
 
 def require_possible(
@@ -48,14 +48,32 @@ def require_possible(
     _require_near_and_slow(scene, snapshot, placement)
     _require_hand(snapshot.hand, gripper)
     _require_arm(snapshot)
-    for body, opening in zip(scene.jointed, snapshot.openings, strict=True):
-        high = body.joint.high
-        if not 0.0 <= opening.position <= high:
-            raise InvalidStateError(
-                f"the opening of {body.name} is {opening.position}, not within [0, {high}]"
-            )
-    _require_apart(scene, snapshot, placement)
+    _require_openings(scene, snapshot)
+    movable = [*_movable(scene, snapshot, placement), ("the hand", snapshot.hand.boxes())]
+    _require_apart(scene, placement, movable)
     _require_held(scene, snapshot)
+
+
+def require_possible_bodies(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> None:
+    """Refuse bodies that cannot be as they were detected, wherever encoders have the hand.
+
+    An arm that is pushed has its hand where this world's could not have it, and fingers are
+    narrower than this world's: that is so, and no error of measurement.
+
+    Args:
+        scene: Bodies of the scene.
+        snapshot: Physics of the state; all numbers are finite.
+        placement: Poses of the bodies that do not move.
+
+    Raises:
+        InvalidStateError: Names the value that is wrong, and what would be right.
+    """
+    require_rotations(_poses(scene, snapshot, placement))
+    _require_near_and_slow(scene, snapshot, placement)
+    _require_openings(scene, snapshot)
+    _require_apart(scene, placement, _movable(scene, snapshot, placement))
 
 
 def _require_near_and_slow(
@@ -118,6 +136,15 @@ def _require_arm(snapshot: ContactSnapshot) -> None:
         )
 
 
+def _require_openings(scene: ContactScene, snapshot: ContactSnapshot) -> None:
+    for body, opening in zip(scene.jointed, snapshot.openings, strict=True):
+        high = body.joint.high
+        if not 0.0 <= opening.position <= high:
+            raise InvalidStateError(
+                f"the opening of {body.name} is {opening.position}, not within [0, {high}]"
+            )
+
+
 def hand_obstacles(
     scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
 ) -> list[OrientedBox]:
@@ -142,13 +169,10 @@ def too_deep(some: Sequence[OrientedBox], others: Sequence[OrientedBox]) -> bool
     return share_space(_pressed(some), _pressed(others))
 
 
-def _require_apart(scene: ContactScene, snapshot: ContactSnapshot, placement: Placement) -> None:
+def _require_apart(
+    scene: ContactScene, placement: Placement, movable: Iterable[NamedBoxes]
+) -> None:
     """Refuse what is inside something else; a jointed body may be inside itself."""
-    movable = [
-        *_free(scene, snapshot),
-        *_jointed(scene, snapshot, placement),
-        ("the hand", snapshot.hand.boxes()),
-    ]
     placed = [(name, _pressed(boxes)) for name, boxes in _fixed(scene, placement)]
     for name, boxes in movable:
         cores = _pressed(boxes)
@@ -156,6 +180,13 @@ def _require_apart(scene: ContactScene, snapshot: ContactSnapshot, placement: Pl
             if share_space(cores, others):
                 raise InvalidStateError(f"{name} and {other} are inside one another")
         placed.append((name, cores))
+
+
+def _movable(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> list[NamedBoxes]:
+    """Boxes inside each body that moves, or of which a part does."""
+    return [*_free(scene, snapshot), *_jointed(scene, snapshot, placement)]
 
 
 def _free(scene: ContactScene, snapshot: ContactSnapshot) -> list[NamedBoxes]:
