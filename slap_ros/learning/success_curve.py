@@ -24,7 +24,7 @@ class CountsSteps(Protocol):
 
     @property
     def steps(self) -> int:
-        """Environment steps."""
+        """Environment steps before the measurement."""
         ...
 
 
