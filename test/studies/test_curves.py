@@ -56,11 +56,12 @@ def test_every_training_has_its_curve_or_is_said_to_have_none(tmp_path):
     assert without["curve"] == old["curve"] == []
     page = (tmp_path / "out" / "curves_cleanup_table.md").read_text()
     assert "| PPO | whole task | `paper` | `learned` |  | 300 | 75% | 200 |" in page
-    assert "| PPO | whole task | `paper` | `older` |  | 300 | no curve recorded |  |" in page
+    assert "| PPO | whole task | `paper` | `older` |  | 300 | - | no curve recorded |" in page
+    assert "| 200,000 | 94% | no curve recorded |" in page  # its end is known
     picture = (tmp_path / "out" / "curves_cleanup_table.svg").read_text()
     assert "SAC, a policy each: no curve recorded" in picture
     said = STUDIES["curves"].summary(found)
-    assert "`fair`: SAC, a policy each no curve recorded" in said
+    assert "`fair`: SAC, a policy each 94% after 200,000 steps" in said
     assert "`paper`: PPO 75% after 300 steps" in said
 
 

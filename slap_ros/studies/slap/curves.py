@@ -54,8 +54,9 @@ shortcuts of a training; of several attempts, the curve is that of the best one.
 *whole task* begins where tasks of its preset begin, and an episode succeeds where the goal is
 reached. So compare what has the same preset and learns the same. Recent are the last 200 episodes
 of a shortcut, and the last 100 of a whole task. *Half* is when half of them succeeded for the first
-time. A training whose record has no curve, as of older versions, has a row without figures, and no
-line."""
+time. A record without a curve, as older versions made it, has the end alone, a cross in the
+picture, or nothing. Where one policy learned all shortcuts, that is of some episodes after
+learning."""
 WHOLE_TASK = "whole task"
 HALF = 0.5
 NO_CURVE = "no curve recorded"
@@ -74,6 +75,7 @@ class RecordedTraining:
         steps: Environment steps of learning.
         exploring: Environment steps of exploration before, of all shortcuts; None of a whole task.
         curve: Success over environment steps; empty where none was recorded.
+        end: Success at the end; None where none was recorded.
         trained: What is said of a baseline, for the command that makes it again.
     """
 
@@ -84,12 +86,13 @@ class RecordedTraining:
     steps: int
     exploring: int | None
     curve: tuple[SuccessPoint, ...]
+    end: float | None
     trained: Data = field(default_factory=dict)
 
     @classmethod
     def of_shortcut(cls, trained: TrainedLibrary, shortcut: Shortcut) -> RecordedTraining:
         """The training of a library's shortcut, from their records."""
-        record = trained.library.record
+        record, curve = trained.library.record, recorded_curve(shortcut.record)
         return cls(
             learner_of(record),
             shortcut.name,
@@ -97,7 +100,8 @@ class RecordedTraining:
             trained.name,
             int(shortcut.record["environment_steps"]),
             int(record["environment_steps"]["exploring"]),
-            recorded_curve(shortcut.record),
+            curve,
+            curve[-1].success if curve else float(shortcut.record["success"]),
         )
 
     @classmethod
@@ -108,6 +112,7 @@ class RecordedTraining:
             name: Name of the baseline's folder.
             baseline: Baseline that was trained.
         """
+        curve = recorded_curve(baseline.record)
         about = {k: v for k, v in describe_baseline(baseline).items() if k != SUCCESS_CURVE}
         return cls(
             baseline.name,
@@ -116,7 +121,8 @@ class RecordedTraining:
             name,
             int(baseline.record["environment_steps"]),
             None,
-            recorded_curve(baseline.record),
+            curve,
+            curve[-1].success if curve else None,
             {"name": name, **about},
         )
 
@@ -139,6 +145,7 @@ class RecordedTraining:
             "training": self.name,
             "steps": self.steps,
             "exploring": self.exploring,
+            "success": self.end,
             "half": self.half,
             "curve": [list(point) for point in self.curve],
             "trained": [self.trained] if self.trained else [],
@@ -146,8 +153,9 @@ class RecordedTraining:
 
     def as_row(self) -> list[str]:
         """Row of a table."""
+        end = "-" if self.end is None else f"{self.end:.0%}"
         half = "never" if self.half is None else f"{self.half:,}"
-        measured = [f"{self.curve[-1].success:.0%}", half] if self.curve else [NO_CURVE, ""]
+        measured = [end, half if self.curve else NO_CURVE]
         exploring = "" if self.exploring is None else f"{self.exploring:,}"
         named = [label(self.learner), self.learns, f"`{self.preset}`", f"`{self.name}`"]
         return [*named, exploring, f"{self.steps:,}", *measured]
@@ -211,17 +219,16 @@ def draw(figure: Figure, panels: Mapping[str, Sequence[RecordedTraining]]) -> No
 
 
 def _draw_panel(axes: Axes, title: str, rows: Sequence[RecordedTraining]) -> None:
-    """A line for each training whose record has a curve; a word for each learner without one."""
+    """A line for each training whose record has a curve, else a cross for its end alone."""
     dashes: dict[str, Any] = {row.learner: cycle(DASHES) for row in rows}
     for row in rows:
+        pen: dict[str, Any] = {"color": APPROACH_STYLES[row.learner].colour}
         if row.curve:
-            axes.plot(
-                [point.steps for point in row.curve],
-                [100.0 * point.success for point in row.curve],
-                color=APPROACH_STYLES[row.learner].colour,
-                linestyle=next(dashes[row.learner]),
-                linewidth=1.3,
-            )
+            success = [100.0 * point.success for point in row.curve]
+            pen |= {"linestyle": next(dashes[row.learner]), "linewidth": 1.3}
+            axes.plot([point.steps for point in row.curve], success, **pen)
+        elif row.end is not None:
+            axes.plot([row.steps], [100.0 * row.end], "x", **pen)
     for learner in dashes:
         known = any(row.curve for row in rows if row.learner == learner)
         text = label(learner) if known else f"{label(learner)}: {NO_CURVE}"
@@ -247,10 +254,10 @@ def _summary(found: Data) -> str:
 def _in_words(rows: Sequence[Data]) -> str:
     """What came of the trainings of a learner under a preset."""
     who = f"`{rows[0]['preset']}`: {label(rows[0]['learner'])}"
-    ends = [row["curve"][-1] for row in rows if row["curve"]]
+    ends = [row for row in rows if row["success"] is not None]
     if not ends:
         return f"{who} {NO_CURVE}"
-    success, steps = fmean(end[1] for end in ends), fmean(end[0] for end in ends)
+    success, steps = fmean(row["success"] for row in ends), fmean(row["steps"] for row in ends)
     return f"{who} {success:.0%} after {steps:,.0f} steps"
 
 
@@ -289,14 +296,16 @@ def prepare(options: CurvesOptions, tell: Tell) -> PreparedStudy:
             f"there is no training of {domain.name} to show: give --library, a folder that `slap "
             f"train {domain.name}` made, or --against, one of `slap baseline train`"
         )
+    described = [describe_library(one.name, one.library) for one in libraries]
+    acting = [
+        {"name": name, "digest": one.digest, "method": one.method, "preset": one.preset}
+        for name, one in baselines.items()
+    ]
     return PreparedStudy(
         {
             "trainings": len(libraries) + len(baselines),
-            "libraries": [describe_library(one.name, one.library) for one in libraries],
-            "baselines": [
-                {"name": name, "digest": one.digest, "method": one.method, "preset": one.preset}
-                for name, one in baselines.items()
-            ],
+            **({"libraries": described} if described else {}),
+            **({"baselines": acting} if acting else {}),
         },
         lambda _: study(domain.name, libraries, baselines),
         {"library": options.libraries, "against": folders, "trainings": None},
