@@ -232,7 +232,7 @@ def _draw_panel(axes: Axes, title: str, rows: Sequence[RecordedTraining]) -> Non
     for learner in dashes:
         known = any(row.curve for row in rows if row.learner == learner)
         text = label(learner) if known else f"{label(learner)}: {NO_CURVE}"
-        axes.plot([], [], color=APPROACH_STYLES[learner].colour, label=text)
+        axes.plot([], [], "-" if known else "x", c=APPROACH_STYLES[learner].colour, label=text)
     axes.set_xscale("log")
     axes.set_ylim(-3, 103)
     axes.set_xlabel("environment steps")
