@@ -28,6 +28,7 @@ from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.files import sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
+from slap_ros.learning.success_curve import SUCCESS_CURVE
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.library_files import require_places
 from slap_ros.skills.domain_choice import DomainChoice
@@ -194,11 +195,12 @@ def describe_baseline(baseline: TrainedBaseline) -> dict[str, Any]:
     """What results say of a baseline: how it was trained, and never by the path of its folder."""
     record = baseline.record
     figures = ("seed", "environment_steps", "episodes", "joints_moved", "cpu_s", "validation")
+    known = {name: record[name] for name in (*figures, SUCCESS_CURVE) if name in record}
     return {
         "method": baseline.method,
         "preset": baseline.preset,
         "noise": baseline.noise,
-        **{name: record[name] for name in figures if name in record},
+        **known,
         "settings": record.get("settings"),
         "command": record.get("command"),
     }

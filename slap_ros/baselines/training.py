@@ -28,8 +28,9 @@ from slap_ros.baselines.trials import task_progress, try_baseline
 from slap_ros.environments.registration import make_task_env
 from slap_ros.environments.task_env import TaskEnv
 from slap_ros.errors import InvalidParameterError
-from slap_ros.learning.json_lines import append_line
+from slap_ros.learning.json_lines import append_line, decoded_lines
 from slap_ros.learning.stored_keys import stored
+from slap_ros.learning.success_curve import SUCCESS_CURVE, SuccessPoint, success_curve
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.work_folder import SETTINGS, WorkFolder
 from slap_ros.versions import processor, versions
@@ -79,7 +80,8 @@ class BaselineTraining:
             learner.learn(_TrainingLog(self.folder, learner, curve, report).report)
         finally:  # after Ctrl-C too
             learner.save(self.folder)
-        return self._chosen(learner, {"task_progress": curve.points} if curve else {})
+        measured = {"task_progress": curve.points} if curve else {}
+        return self._chosen(learner, {SUCCESS_CURVE: self._success_curve(), **measured})
 
     def _require_own_folder(self) -> None:
         """Refuse a folder whose checkpoint is another training's, or nobody knows whose.
@@ -105,6 +107,15 @@ class BaselineTraining:
         )
         curve.go_on(learner.progress.steps)
         return curve
+
+    def _success_curve(self) -> list[list[float]]:
+        """The success of recent episodes over environment steps, of earlier runs as well."""
+
+        def point(line: Mapping[str, Any]) -> tuple[int, SuccessPoint]:
+            return 0, SuccessPoint(int(line["steps"]), float(line["success"]))
+
+        advice = "remove the folder to train from the beginning"
+        return success_curve(decoded_lines(self.folder / PROGRESS, point, advice))
 
     @property
     def _identity(self) -> dict[str, Any]:

@@ -8,7 +8,6 @@ A policy is a file of safetensors, what is known of it a JSON object, a library 
 from __future__ import annotations
 
 import errno
-import json
 import os
 import shutil
 from collections.abc import Callable, Mapping
@@ -22,7 +21,14 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
-from slap_ros.files import exchange, parse_json, read_bytes, read_text, require_writable
+from slap_ros.files import (
+    exchange,
+    parse_json,
+    pretty_json,
+    read_bytes,
+    read_text,
+    require_writable,
+)
 from slap_ros.policies.activation import ACTIVATIONS
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 
@@ -329,4 +335,4 @@ def write_object(path: Path, data: Mapping[str, Any]) -> None:
 
 def object_text(data: Mapping[str, Any]) -> str:
     """The text of a JSON object; the same for the same data."""
-    return json.dumps(data, indent=2, allow_nan=False) + "\n"
+    return pretty_json(data) + "\n"

@@ -14,6 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 from slap_ros.learning.json_lines import decoded_lines
 from slap_ros.learning.stored_keys import restored, stored
+from slap_ros.learning.success_curve import SUCCESS_CURVE, SuccessPoint, success_curve
 from slap_ros.policies.library_files import replace_folder
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -65,6 +66,11 @@ def _lines(folder: ShortcutWorkFolder, decode: Callable[[Mapping[str, Any]], T])
     if not folder.progress.exists():
         return ()
     return decoded_lines(folder.progress, decode, "remove the folder to learn the shortcut again")
+
+
+def _success(line: Mapping[str, Any]) -> tuple[int, SuccessPoint]:
+    """Stage and success in a line of a progress file."""
+    return int(line["stage"]), SuccessPoint(int(line["steps"]), float(line["success"]))
 
 
 def _cpu_s_before(folder: ShortcutWorkFolder) -> float:
@@ -134,7 +140,7 @@ class ProgressRecorder:
         """Processor time so far, s, that of interrupted processes included."""
         return _cpu_s() - self._cpu_s_at_start
 
-    def record(self) -> dict[str, str | int | float]:
+    def record(self) -> dict[str, Any]:
         """The figures by name; success and length are those of the last episodes, with noise."""
         last = self._latest[max(self._latest)]
         return {
@@ -143,6 +149,7 @@ class ProgressRecorder:
             "success": last.success,
             "length": last.length if last.length == last.length else -1.0,
             "cpu_s": self._cpu_s,
+            SUCCESS_CURVE: success_curve(_lines(self._folder, _success)),
         }
 
 

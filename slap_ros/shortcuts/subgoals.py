@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.success_curve import SUCCESS_CURVE
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.candidate_groups import CandidateGroup, other_problems
@@ -130,7 +132,7 @@ def learn_together(attempt: SubgoalAttempt, processes: int) -> list[Shortcut]:
 
 
 def _tried(
-    part: ShortcutEnvSpec, policy: MlpPolicy, whole: Mapping[str, str | int | float], count: int
+    part: ShortcutEnvSpec, policy: MlpPolicy, whole: Mapping[str, Any], count: int
 ) -> Shortcut:
     """A shortcut with the figures of some episodes; of the learning it has an equal share.
 
@@ -154,6 +156,7 @@ def _tried(
         "length": float(np.mean(lengths)) if lengths else -1.0,
         "cpu_s": float(whole["cpu_s"]) / count,
         "together": count,
+        SUCCESS_CURVE: whole[SUCCESS_CURVE],  # of all of them, over the steps of all of them
     }
     return Shortcut(part.signature, policy, min(lengths, default=part.horizon), record)
 

@@ -29,6 +29,7 @@ from slap_ros.studies.lg_sail import (
 from slap_ros.studies.slap import (
     ablation,
     camera,
+    curves,
     dynamics,
     generalisation,
     goals,
@@ -84,6 +85,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         table1.STUDY,
         rivals.STUDY,
         learners.STUDY,
+        curves.STUDY,
         ablation.STUDY,
     )
 }

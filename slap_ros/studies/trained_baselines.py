@@ -49,3 +49,8 @@ def open_baselines(
             continue
         found[folder.resolve().name] = baseline
     return found
+
+
+def other_goal(baseline: TrainedBaseline) -> str:
+    """Why a baseline cannot be compared in the tasks of its preset; empty where it can."""
+    return "" if baseline.goal is None else f"trained for another goal, {baseline.goal}"

@@ -155,6 +155,9 @@ def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     before = torch.load(tmp_path / "x-training" / "checkpoint.pt", weights_only=True)["steps"]
     record = train_baseline(method, domain, tmp_path / "x", **given).record
     assert 120 <= before < 200 <= record["environment_steps"] < 300
+    steps = [point[0] for point in record["success_curve"]]
+    assert steps == sorted(set(steps))  # what was done twice is there once
+    assert steps[0] < before < steps[-1] == record["environment_steps"]
     with pytest.raises(InvalidParameterError, match="other settings"):
         train_baseline(method, domain, tmp_path / "x", **given, seed=1)
     if replays:

@@ -26,7 +26,9 @@ def test_processor_time_goes_on_where_an_interrupted_process_was(tmp_path: Path)
     again = ProgressRecorder(folder)
     again.of(1, None)(FIRST)  # type: ignore[arg-type]
     assert 1000.0 <= lines(folder)[1]["cpu_s"] <= again.record()["cpu_s"] < 2000.0
-    assert again.record()["environment_steps"] == 20
+    record = again.record()
+    assert record["environment_steps"] == 20
+    assert record["success_curve"] == [[10, 0.5], [20, 0.5]]
 
 
 def test_progress_of_earlier_versions_has_no_processor_time(tmp_path: Path) -> None:

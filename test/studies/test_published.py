@@ -88,9 +88,10 @@ def test_pages_have_tasks_enough():
 
 
 def of_libraries(learners):
-    """The results about several libraries: of other learners, or of ours alone."""
+    """The results about several libraries: of other learners as well, or of ours alone."""
+    both = ("learners", "curves")
     named = (name for name, data in RESULTS.items() if "libraries" in data)
-    return sorted(name for name in named if (RESULTS[name]["study"] == "learners") == learners)
+    return sorted(name for name in named if (RESULTS[name]["study"] in both) == learners)
 
 
 @pytest.mark.parametrize("name", of_libraries(False))

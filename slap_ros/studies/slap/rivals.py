@@ -28,7 +28,12 @@ from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval, plot_whole
 from slap_ros.studies.slap.library_rows import Row, relative_cell
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
-from slap_ros.studies.trained_baselines import BASELINES, baselines_in_runs, open_baselines
+from slap_ros.studies.trained_baselines import (
+    BASELINES,
+    baselines_in_runs,
+    open_baselines,
+    other_goal,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -208,7 +213,7 @@ def prepare(options: RivalsOptions, tell: Tell) -> PreparedStudy:
     require_gymnasium()
     domain = get_domain(options.domain)
     folders = options.against or baselines_in_runs(options.domain)
-    baselines = open_baselines(folders, domain, _why_not, tell)
+    baselines = open_baselines(folders, domain, other_goal, tell)
     if not baselines:
         raise InvalidParameterError(
             f"there is no baseline of {options.domain} to compare with; `slap baseline train "
@@ -225,11 +230,6 @@ def prepare(options: RivalsOptions, tell: Tell) -> PreparedStudy:
         lambda runner: study(options.domain, baselines, tasks, runner),
         {"against": folders, **own},
     )
-
-
-def _why_not(baseline: TrainedBaseline) -> str:
-    """Why a baseline cannot be compared; empty where it can."""
-    return "" if baseline.goal is None else f"trained for another goal, {baseline.goal}"
 
 
 STUDY = Study(

@@ -13,6 +13,7 @@ from typing import Any
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
 from slap_ros.learning.json_lines import decoded_lines
+from slap_ros.learning.success_curve import by_stage
 from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
@@ -163,20 +164,15 @@ def read_curve(path: Path) -> LearningCurve:
     Raises:
         InvalidParameterError: A line is damaged, or there is none; names file and line.
     """
-    stages: dict[int, list[LearningPoint]] = {}
-    for stage, point in decoded_lines(path, _point, ADVICE):
-        points = stages.setdefault(stage, [])
-        while points and points[-1].steps >= point.steps:
-            points.pop()
-        points.append(point)
+    stages = by_stage(decoded_lines(path, _point, ADVICE))
     if not stages:
         raise InvalidParameterError(f"{path}: nothing learned so far; try again later")
     joined: list[LearningPoint] = []
     begins: list[int] = []
-    for stage in sorted(stages):
+    for own in stages.values():
         before = joined[-1].steps if joined else 0
         begins.append(before)
-        joined += [LearningPoint(before + p.steps, p.success, p.length) for p in stages[stage]]
+        joined += [LearningPoint(before + p.steps, p.success, p.length) for p in own]
     return LearningCurve(path.parent.name, tuple(joined), tuple(begins[1:]))
 
 
