@@ -106,9 +106,10 @@ class JointSpline:
             return self.end
         piece = max(0, int(np.searchsorted(self._times, time_s, side="right")) - 1)
         after = time_s - self._times[piece]
-        powers: Array = after ** np.arange(6.0)
-        found: Array = powers @ self._pieces[piece]
-        return found
+        *rest, found = self._pieces[piece]
+        for coefficients in reversed(rest):  # Horner: the same bits on every processor
+            found = found * after + coefficients
+        return np.asarray(found)
 
 
 Knot = tuple[float, Array, Array | None, Array | None]

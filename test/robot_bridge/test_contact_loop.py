@@ -3,6 +3,8 @@
 """Skills at a bench that act on what is measured on the robot in MuJoCo, while it moves."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -16,9 +18,11 @@ from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domai
 from slap_ros.studies.robot_trials import solve_on_robot
 from slap_ros.worlds.contact.clearing import DEEPEST
 from slap_ros.worlds.contact.features import ROBOT
-from slap_ros.worlds.contact.hand import PALM
+from slap_ros.worlds.contact.hand import PALM, rotation_between
 from slap_ros.worlds.contact.snapshot import ContactIndex
-from slap_ros.worlds.panda import grasp_pose
+from slap_ros.worlds.panda import HOME, GraspKinematics, grasp_pose
+from support.programs import environment
+from tools.processors import PROCESSORS
 
 pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")
@@ -33,7 +37,12 @@ from slap_ros.robot.mujoco.arm import (
 )
 from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld
 from slap_ros.robot.mujoco.engine import mujoco
-from slap_ros.robot.mujoco.impedance import FORCE, HandImpedance
+from slap_ros.robot.mujoco.impedance import (
+    FORCE,
+    POSTURE_STIFFNESS,
+    TURN_STIFFNESS,
+    HandImpedance,
+)
 from slap_ros.robot.mujoco.model import scene_around
 
 SEED = 300
@@ -132,6 +141,54 @@ def test_the_same_actions_give_the_same_states_to_the_bit(domain, control):
         world = loop_world(domain, control)
         states.append([world.step(action).data.tobytes() for action in actions])
     assert states[0] == states[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("processor", ["nehalem", "numpy"])
+def test_other_processors_have_the_same_states_to_the_bit(processor):
+    """Whatever code numpy and its linear algebra choose there."""
+    program = """
+import numpy as np
+from slap_ros.robot.mujoco.contact_loop import ContactLoopWorld
+from slap_ros.robot.mujoco.impedance import HandImpedance
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+domain = open_domain(DomainChoice("stack_at_target", skills=DEMONSTRATOR, measured=True))
+for control in (HandImpedance(), None):
+    given = () if control is None else (control,)
+    world = ContactLoopWorld(domain, domain.task(300).initial_state, *given)
+    for action in np.random.default_rng(0).uniform(-0.02, 0.02, (6, 5)):
+        state = world.step(action)
+    print(state.data.tobytes().hex())
+"""
+    here, there = (
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment() | dict(PROCESSORS[name] if name else {}),
+            check=True,
+            stdout=subprocess.PIPE,
+        ).stdout
+        for name in ("", processor)
+    )
+    assert here == there != b""
+
+
+def test_the_elbow_goes_where_that_moves_no_hand():
+    """Torques are those of numpy's pseudo-inverse, and none beyond a Panda's."""
+    rng, control = np.random.default_rng(0), HandImpedance()
+    for _ in range(20):
+        joints = np.add(HOME, rng.normal(0.0, 0.2, 7))
+        matrix = GraspKinematics(joints).jacobian()
+        told = joints + np.linalg.svd(matrix)[2][-1] * 0.02  # where the hand is, but for curvature
+        torques = control.commands(told, joints, np.zeros(7))
+        unmoved = np.eye(7) - np.linalg.pinv(matrix) @ matrix
+        way = np.subtract(grasp_pose(told).position, grasp_pose(joints).position)
+        turn = rotation_between(grasp_pose(joints), grasp_pose(told))
+        wrench = np.concatenate([control.stiffness * way, TURN_STIFFNESS * np.array(turn)])
+        posture = POSTURE_STIFFNESS * (told - joints)
+        np.testing.assert_allclose(torques, matrix.T @ wrench + unmoved @ posture, atol=1e-9)
+        assert np.linalg.norm(unmoved @ posture) > 0.99 * np.linalg.norm(posture)
+    far = control.commands(joints + 0.5, joints, np.zeros(7))
+    assert max(np.abs(far) / TORQUE) == pytest.approx(1.0)
 
 
 def pressed_n(world):

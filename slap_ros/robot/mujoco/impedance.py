@@ -10,18 +10,16 @@ world pulls its hand alike.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.mujoco.arm import TORQUE, ArmControl, ArmMotors, MotorLaw, Numbers
 from slap_ros.worlds.contact.hand import rotation_between
 from slap_ros.worlds.contact.hand_model import PANDA, PANDA_STIFFNESS
-from slap_ros.worlds.panda import JOINTS, GraspKinematics, grasp_pose
+from slap_ros.worlds.panda import GraspKinematics, grasp_pose
 
 DAMPING = 3.3  # √kg: times √stiffness it is N s/m, .7 of critical for the arm that moves along
 FORCE = PANDA.pull_n  # N, along each axis of the base at most
@@ -29,8 +27,7 @@ MOMENT = 8.0  # Nm, about each axis of the base at most
 TURN_STIFFNESS, TURN_DAMPING = 300.0, 15.0  # Nm/rad and Nm s/rad, about each axis of the base
 # Of joints, where that does not move the hand: the elbow goes where it was told to be.
 POSTURE_STIFFNESS, POSTURE_DAMPING = 60.0, 8.0  # Nm/rad and Nm s/rad
-
-Torques = NDArray[np.float64]
+SINGULAR = 1e-9  # of a row of the Jacobian: what is left of it where others say the same
 
 
 @dataclass(frozen=True)
@@ -61,8 +58,8 @@ class HandImpedance:
         """The trajectory's end at once: the force that pulls the hand there is limited."""
         return [TrajectoryPoint(point.time_s, points[-1].positions) for point in points]
 
-    def commands(self, told: Numbers, joints: Numbers, velocities: Numbers) -> Numbers:
-        """Torques of the joints, Nm, shape (7,), besides those that carry the arm.
+    def commands(self, told: Numbers, joints: Numbers, velocities: Numbers) -> list[float]:
+        """Torques of the joints, Nm, besides those that carry the arm.
 
         Args:
             told: Joint positions to go to, rad, shape (7,).
@@ -72,20 +69,64 @@ class HandImpedance:
         Returns:
             None of them beyond a Panda's.
         """
-        now, goal, rates = GraspKinematics(joints), grasp_pose(told), np.asarray(velocities)
-        jacobian = now.jacobian()
-        speed = jacobian @ rates
-        way = np.subtract(goal.position, now.grasp.position)
-        turn = np.array(rotation_between(now.grasp, goal))
+        now, goal, rates = GraspKinematics(joints), grasp_pose(told), [float(v) for v in velocities]
+        rows = now.jacobian().tolist()
+        *speed, wx, wy, wz = (_product(row, rates) for row in rows)
         damping = DAMPING * math.sqrt(self.stiffness)
-        force = np.clip(self.stiffness * way - damping * speed[:3], -FORCE, FORCE)
-        moment = np.clip(TURN_STIFFNESS * turn - TURN_DAMPING * speed[3:], -MOMENT, MOMENT)
-        posture = POSTURE_STIFFNESS * np.subtract(told, joints) - POSTURE_DAMPING * rates
-        unmoved = np.eye(JOINTS) - jacobian.T @ np.linalg.pinv(jacobian.T)
-        torques = jacobian.T @ np.concatenate([force, moment]) + unmoved @ posture
+        way = zip(goal.position, now.grasp.position, speed, strict=True)
+        turn = zip(rotation_between(now.grasp, goal), (wx, wy, wz), strict=True)
+        wrench = [_within(self.stiffness * (to - at) - damping * v, FORCE) for to, at, v in way]
+        wrench += [_within(TURN_STIFFNESS * r - TURN_DAMPING * w, MOMENT) for r, w in turn]
+        posture = [
+            POSTURE_STIFFNESS * (float(to) - float(at)) - POSTURE_DAMPING * rate
+            for to, at, rate in zip(told, joints, rates, strict=True)
+        ]
+        unmoved = _null_space_part(rows, posture)
+        columns = zip(*rows, strict=True)
+        torques = [_product(each, wrench) + p for each, p in zip(columns, unmoved, strict=True)]
         # All of them: a joint that gave less than the others would tilt the hand.
-        limited: Torques = torques / max(1.0, *(np.abs(torques) / TORQUE))
-        return limited
+        excess = max(
+            1.0, *(abs(torque) / most for torque, most in zip(torques, TORQUE, strict=True))
+        )
+        return [torque / excess for torque in torques]
+
+
+# Plain Python: numpy's linear algebra has other last bits on other processors, and contact
+# amplifies them.
+
+
+def _product(some: Sequence[float], others: Sequence[float]) -> float:
+    return math.fsum(map(operator.mul, some, others))
+
+
+def _within(value: float, most: float) -> float:
+    return min(max(value, -most), most)
+
+
+def _null_space_part(rows: Sequence[Sequence[float]], vector: Sequence[float]) -> Sequence[float]:
+    """The part of a vector that is orthogonal to all rows, by Gram and Schmidt.
+
+    Args:
+        rows: Rows of a matrix, shape (n, m).
+        vector: Shape (m,).
+    """
+    directions: list[Sequence[float]] = []
+    for row in rows:
+        left = _orthogonal_part(row, directions)
+        length = math.sqrt(_product(left, left))
+        if length > SINGULAR:
+            directions.append([value / length for value in left])
+    return _orthogonal_part(vector, directions)
+
+
+def _orthogonal_part(
+    vector: Sequence[float], directions: Sequence[Sequence[float]]
+) -> Sequence[float]:
+    """A vector without its parts along orthonormal directions."""
+    for direction in directions:
+        along = _product(vector, direction)
+        vector = [value - along * d for value, d in zip(vector, direction, strict=True)]
+    return vector
 
 
 def arm_control(impedance: float, stiffness: float, lag_s: float) -> ArmControl:
