@@ -18,8 +18,7 @@ from slap_ros.robot.franka.limits import JERK, franka_limits
 from slap_ros.robot.limits import FR3, Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.worlds.contact.hand_model import PANDA, PANDA_STIFFNESS
-from slap_ros.worlds.panda import JOINTS
+from slap_ros.worlds.panda import IMPEDANCE, JOINTS
 
 # As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
 TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
@@ -31,8 +30,8 @@ BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
     {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 70.0}
 )
 # At a bench fingers press as hard as those of the contact world (``HandModel``).
-BEFORE_MUJOCO_AT_A_BENCH = MappingProxyType({**BEFORE_MUJOCO, "gripper_effort": PANDA.grip_n})
-MUJOCO_AT_A_BENCH = MappingProxyType({"impedance": PANDA_STIFFNESS})  # of the robot itself
+BEFORE_MUJOCO_AT_A_BENCH = MappingProxyType({**BEFORE_MUJOCO, "gripper_effort": 40.0})
+MUJOCO_AT_A_BENCH = MappingProxyType({"impedance": IMPEDANCE})  # of the robot itself
 OF_JOINTS = frozenset({"stiffness", "lag"})  # who sets one of these has joints pulled instead
 Parameters = Mapping[str, str | int | float | tuple[float, ...]]
 WORKSPACE = (*Workspace().low, *Workspace().high)

@@ -24,6 +24,7 @@ __all__ = [
     "GRASP_POINT",
     "HAND",
     "HOME",
+    "IMPEDANCE",
     "JOINTS",
     "JOINT_HIGH",
     "JOINT_LOW",
@@ -43,6 +44,7 @@ JOINT_LOW = (-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)  # r
 JOINT_HIGH = (2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)  # rad
 MAX_STEP = (0.087, 0.053, 0.087, 0.045, 0.087, 0.057, 0.087)  # rad, either way in a control step
 CONTROL_PERIOD_S = 0.125
+IMPEDANCE = 3000.0  # N/m of the hand, the most that Franka's own controller takes
 
 FINGER_OPEN, FINGER_CLOSED = 0.04, 0.0  # m, distance of each finger from the middle
 GRASP_POINT = 0.1034  # m, from the hand's frame along its z to between the fingertips

@@ -18,8 +18,8 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.mujoco.arm import TORQUE, ArmControl, ArmMotors, MotorLaw, Numbers
 from slap_ros.worlds.contact.hand import rotation_between
-from slap_ros.worlds.contact.hand_model import PANDA, PANDA_STIFFNESS
-from slap_ros.worlds.panda import GraspKinematics, grasp_pose
+from slap_ros.worlds.contact.hand_model import PANDA
+from slap_ros.worlds.panda import IMPEDANCE, GraspKinematics, grasp_pose
 
 DAMPING = 3.3  # √kg: times √stiffness it is N s/m, .7 of critical for the arm that moves along
 FORCE = PANDA.pull_n  # N, along each axis of the base at most
@@ -41,7 +41,7 @@ class HandImpedance:
         InvalidParameterError: It is not above 0.
     """
 
-    stiffness: float = PANDA_STIFFNESS
+    stiffness: float = IMPEDANCE
 
     def __post_init__(self) -> None:
         """Check that a hand can be held so."""

@@ -39,7 +39,7 @@ from slap_ros.studies.robot_trials import solve_on_robot
 from slap_ros.studies.row_figures import name_rows, plot_interval, plot_whole
 from slap_ros.studies.study import PreparedStudy, Study
 from slap_ros.worlds.contact.features import ROBOT
-from slap_ros.worlds.contact.hand_model import PANDA_STIFFNESS
+from slap_ros.worlds.panda import IMPEDANCE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -288,7 +288,7 @@ class ClosedLoopOptions:
         list[float] | None,
         CommandOption(
             f"Stiffness with which the hand is pulled, in N/m. May be repeated. "
-            f"Default: {PANDA_STIFFNESS:g}, without --stiffness.",
+            f"Default: {IMPEDANCE:g}, without --stiffness.",
             name="--impedance",
         ),
     ] = None
@@ -336,7 +336,7 @@ def _arms(options: ClosedLoopOptions) -> list[ArmChoice]:
     Raises:
         InvalidParameterError: There is no such arm.
     """
-    impedances = options.impedance or ([] if options.stiffness else [PANDA_STIFFNESS])
+    impedances = options.impedance or ([] if options.stiffness else [IMPEDANCE])
     arms = [ArmChoice(impedance=impedance) for impedance in impedances]
     arms += [ArmChoice(0.0, factor, options.lag) for factor in options.stiffness or ()]
     for arm in arms:

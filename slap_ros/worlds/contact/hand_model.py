@@ -41,8 +41,7 @@ class HandModel:
 
 
 QUICK = HandModel()
-# A Panda's arm pulls its hand so, the most that Franka's own impedance controller takes, N/m.
-PANDA_STIFFNESS = 3000.0
-# With that it lags by 50 ms; its pads are less rough.
+# A Panda's whose arm is an impedance as stiff as Franka's takes: it lags by 50 ms, and its pads are
+# less rough.
 PANDA = HandModel(share=0.05, finger_speed=0.05, friction=1.0)
 HANDS = {"quick": QUICK, "panda": PANDA}
