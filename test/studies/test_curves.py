@@ -19,8 +19,8 @@ pytest.importorskip("matplotlib")
 ROOT = Path(__file__).parent.parent
 SHIPPED = ROOT.parent / "models" / "shortcuts" / "cleanup_table"
 WITHOUT_CURVE = ROOT.parent / "models" / "learners" / "cleanup_table" / "sac"
-RECORD = {"environment_steps": 300, "command": "slap baseline train ppo cleanup_table"}
-CURVE = [[100, 0.0], [200, 0.5], [300, 0.75]]
+RECORD = {"environment_steps": 3000, "command": "slap baseline train ppo cleanup_table"}
+CURVE = [[1000, 0.0], [2000, 0.5], [3000, 0.75]]
 
 
 def baseline(folder, goal=None, **record):
@@ -51,18 +51,18 @@ def test_every_training_has_its_curve_or_is_said_to_have_none(tmp_path):
     record = json.loads(path.read_text())["record"]
     assert shortcut["curve"] == record["success_curve"]
     assert shortcut["curve"][-1][0] == shortcut["steps"] == record["environment_steps"]
-    assert (ppo["curve"], ppo["half"], ppo["learns"]) == (CURVE, 200, "whole task")
+    assert (ppo["curve"], ppo["half"], ppo["learns"]) == (CURVE, 2000, "whole task")
     assert ppo["trained"][0]["command"] == RECORD["command"]
     assert without["curve"] == old["curve"] == []
     page = (tmp_path / "out" / "curves_cleanup_table.md").read_text()
-    assert "| PPO | whole task | `paper` | `learned` |  | 300 | 75% | 200 |" in page
-    assert "| PPO | whole task | `paper` | `older` |  | 300 | - | no curve recorded |" in page
+    assert "| PPO | whole task | `paper` | `learned` |  | 3,000 | 75% | 2,000 |" in page
+    assert "| PPO | whole task | `paper` | `older` |  | 3,000 | - | no curve recorded |" in page
     assert "| 200,000 | 94% | no curve recorded |" in page  # its end is known
     picture = (tmp_path / "out" / "curves_cleanup_table.svg").read_text()
     assert "SAC, a policy each: no curve recorded" in picture
     said = STUDIES["curves"].summary(found)
     assert "`fair`: SAC, a policy each 94% after 200,000 steps" in said
-    assert "`paper`: PPO 75% after 300 steps" in said
+    assert "`paper`: PPO 75% after 3,000 steps" in said
 
 
 def test_without_any_training_there_is_nothing_to_show(tmp_path):

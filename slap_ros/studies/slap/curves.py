@@ -60,6 +60,7 @@ learning."""
 WHOLE_TASK = "whole task"
 HALF = 0.5
 NO_CURVE = "no curve recorded"
+FIRST = 400  # environment steps from which on curves are drawn: episodes are few before
 DASHES = ("-", "--", ":", "-.")  # of several trainings or shortcuts of one learner
 
 
@@ -214,6 +215,7 @@ def draw(figure: Figure, panels: Mapping[str, Sequence[RecordedTraining]]) -> No
     axes = list(figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).flat)
     for one, (title, rows) in zip(axes, panels.items(), strict=False):
         _draw_panel(one, title, rows)
+    axes[0].set_xlim(left=FIRST)  # of all
     for one in axes[len(panels) :]:
         one.remove()
 
