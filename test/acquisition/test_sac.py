@@ -202,7 +202,7 @@ def test_a_full_buffer_forgets_the_oldest():
     env = SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,))
     one = SkillLearner(env, small, 1)
     for _ in range(4):
-        episodes = one.learn(3)
+        episodes = one.learn(2)
     assert one.buffer.size() <= small.buffer_size
     count = episodes.transitions
     newest = one.buffer.actions[one.buffer.size() - count : one.buffer.size(), 0]
@@ -258,7 +258,7 @@ FRESH_SEEN = SkillVecEnv(MDP, FRESH, 8, HORIZON, (9,)).observations
 @pytest.mark.training
 def test_torch_and_numpy_say_the_same():
     one = learner()
-    one.learn(3)
+    one.learn(2)
     ours = one.policy().mean(FRESH_SEEN)
     theirs, _ = one._sac.predict(FRESH_SEEN, deterministic=True)
     assert np.allclose(ours, theirs, atol=1e-5)
