@@ -42,7 +42,7 @@ def advertise(node: Node, topic: Topic) -> Publisher:
     """
     if topic not in OVERRIDABLE:
         return node.create_publisher(topic.type, topic.name, topic.qos)
-    return _overridden(node.create_publisher, topic)
+    return _overridden(node, node.create_publisher, topic)
 
 
 def subscribe(node: Node, topic: Topic, callback: Callable[..., None], **options: Any) -> None:
@@ -61,14 +61,16 @@ def subscribe(node: Node, topic: Topic, callback: Callable[..., None], **options
         InvalidParameterError: An override names a value that there is not.
     """
     if topic in OVERRIDABLE:
-        _overridden(node.create_subscription, topic, callback, **options)
+        _overridden(node, node.create_subscription, topic, callback, **options)
         return
     qos = copy(topic.qos)
     qos.depth = max(qos.depth, BACKLOG)
     node.create_subscription(topic.type, topic.name, callback, qos, **options)
 
 
-def _overridden(create: Callable[..., Any], topic: Topic, *callback: object, **options: Any) -> Any:
+def _overridden(
+    node: Node, create: Callable[..., Any], topic: Topic, *callback: object, **options: Any
+) -> Any:
     overriding = QoSOverridingOptions(POLICIES, callback=_accepted)
     try:
         return create(
@@ -80,6 +82,8 @@ def _overridden(create: Callable[..., Any], topic: Topic, *callback: object, **o
             **options,
         )
     except (RuntimeError, InvalidQosOverridesError) as error:
+        if not node.context.ok():  # a signal came meanwhile, and shut it down
+            raise
         raise InvalidParameterError(f"parameters qos_overrides of {topic.name}: {error}") from error
 
 

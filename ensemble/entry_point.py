@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from traceback import format_exc
 
 import rclpy
@@ -16,7 +17,12 @@ from rclpy.node import Node
 from ensemble.network import start_node
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.redaction import without_secrets
-from slap_ros.signals import forget_interrupt, interrupts_ignored, interrupts_in_destructors
+from slap_ros.signals import (
+    OneInterrupt,
+    forget_interrupt,
+    interrupted_once,
+    interrupts_in_destructors,
+)
 
 
 def run_node(name: str, make: Callable[[], Node]) -> int:
@@ -25,20 +31,18 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
     Returns:
         Exit code: 0 after a signal, else the error's code, whose message went to stderr.
     """
-    with interrupts_in_destructors(_say_nothing):
-        try:
-            return _run(name, make)
-        finally:
-            rclpy.try_shutdown()
-
-
-def _say_nothing(_: KeyboardInterrupt) -> None:
-    """Leave it: rclpy has shut the context down by then, which ends the node as well."""
-
-
-def _run(name: str, make: Callable[[], Node]) -> int:
     try:
-        _spin(make)
+        with interrupted_once() as interrupt, interrupts_in_destructors(interrupt.send_again):
+            return _run(name, make, interrupt)
+    except KeyboardInterrupt:  # it came while a node ended that rclpy had told to end already
+        return 0
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run(name: str, make: Callable[[], Node], interrupt: OneInterrupt) -> int:
+    try:
+        _spin(make, interrupt)
     except (KeyboardInterrupt, ExternalShutdownException):
         forget_interrupt()
         return 0
@@ -55,14 +59,14 @@ def _run(name: str, make: Callable[[], Node]) -> int:
     return 0
 
 
-def _spin(make: Callable[[], Node]) -> None:
+def _spin(make: Callable[[], Node], interrupt: OneInterrupt) -> None:
     node = start_node(make)
     try:
-        if rclpy.ok():  # not stopped while the node was made: rclpy's executor would print an error
-            rclpy.spin(node)
+        with closing(interrupt):
+            if rclpy.ok():  # not stopped while it was made: rclpy's executor would print an error
+                rclpy.spin(node)
     finally:
-        with interrupts_ignored():
-            node.destroy_node()
+        node.destroy_node()
 
 
 def _refuse(name: str, error: Exception, code: ErrorCode) -> int:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -19,10 +18,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ensemble.loopback import loopback_only
-from ensemble.startup import leave_quietly
 from slap_ros.doctor import settings
 from slap_ros.errors import InvalidParameterError
-from slap_ros.signals import raise_after_imports
 
 DISCOVERY_RANGE = settings.RANGE
 CYCLONE = "rmw_cyclonedds_cpp"
@@ -54,8 +51,6 @@ def join_network(**options: Any) -> None:
     for fault in settings.impossible():
         raise InvalidParameterError(f"{fault.found}. {fault.advice}")
     os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
-    if signal.getsignal(signal.SIGINT) is leave_quietly:
-        signal.signal(signal.SIGINT, raise_after_imports)  # for rclpy to go on with
     try:
         rclpy.init(**options)
     except (RCLError, UnknownROSArgsError) as error:

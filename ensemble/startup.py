@@ -35,6 +35,7 @@ def main_of(package: str) -> int:
     except Exception as error:
         return _refused(package, error)
     code: int = node.main()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # nothing is left that it could end sooner
     _leave_threads_behind(code)
     return code
 

@@ -130,19 +130,57 @@ def signals_held_back() -> Iterator[None]:
             signal.raise_signal(arrived[0])
 
 
-@contextmanager
-def interrupts_ignored() -> Iterator[None]:
-    """Ignore SIGINT in between, for what has to end: a file that is closed, an arm brought to rest.
+class OneInterrupt:
+    """A handler of SIGINT that raises it once at most, and never after it was closed.
 
-    Ctrl-C is pressed twice, or arrives from the terminal and from a parent that passes it on.
+    Ctrl-C is pressed twice, or arrives from the terminal and from a parent that passes it on. What
+    ends by the first, or by itself, ends undisturbed: a file is closed, an arm brought to rest.
     """
+
+    def __init__(self) -> None:
+        self._closed = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Raise it, unless it was raised before.
+
+        Args:
+            number: The signal's.
+            frame: What is executed.
+
+        Raises:
+            KeyboardInterrupt: It is the first one.
+        """
+        if self._closed:
+            return
+        self._closed = not _importing(frame)
+        raise_after_imports(number, frame)
+
+    def send_again(self, error: KeyboardInterrupt) -> None:
+        """Have it raised a little later: it fell where nothing can be raised.
+
+        Args:
+            error: What was raised.
+        """
+        self._closed = False
+        _send_again(error)
+
+    def close(self) -> None:
+        """Raise none from now on."""
+        self._closed = True
+
+
+@contextmanager
+def interrupted_once() -> Iterator[OneInterrupt]:
+    """Let SIGINT raise a KeyboardInterrupt in between once at most."""
+    interrupt = OneInterrupt()
     if threading.current_thread() is not threading.main_thread():  # no other is ever interrupted
-        yield
+        yield interrupt
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = signal.signal(signal.SIGINT, interrupt)
     try:
-        yield
+        yield interrupt
     finally:
+        interrupt.close()
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 

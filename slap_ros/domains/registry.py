@@ -12,13 +12,12 @@ nobody else's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from importlib import import_module
 from importlib.metadata import Distribution, EntryPoint, distributions
 from traceback import format_exception_only
+from types import TracebackType
 
 from slap_ros.core import Domain, DomainFactory
 from slap_ros.domains.variation import parse_preset
@@ -130,7 +129,7 @@ def forget_domains() -> None:
 def _make(name: str, preset: str) -> Domain:
     factory = _factory(name)
     base, changes = parse_preset(preset)
-    with _blaming(name, let_pass=(InvalidParameterError,)):
+    with _Blame(name, let_pass=(InvalidParameterError,)):
         domain = factory(base, changes)
         if not isinstance(domain, Domain):
             raise InvalidDomainError(f"domain {name!r} made {domain!r}, which is not a Domain")
@@ -146,7 +145,7 @@ def _factory(name: str) -> DomainFactory:
     entries = [entry for entry in registrations().entries if entry.name == name]
     if name not in OURS and not entries:
         raise UnknownDomainError(f"unknown domain {name!r}; there are {', '.join(domain_names())}")
-    with _blaming(name):
+    with _Blame(name):
         made = import_module(OURS[name]).make if name in OURS else _load(name, entries)
         if not callable(made):
             raise InvalidDomainError(f"domain {name!r}: {made!r} is not a function that makes it")
@@ -161,25 +160,30 @@ def _load(name: str, entries: list[EntryPoint]) -> object:
     return entries[0].load()
 
 
-@contextmanager
-def _blaming(name: str, let_pass: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+class _Blame:
     """Raise whatever a domain's own code raises, even to end the process, as that domain's error.
 
-    Args:
-        name: Name of the domain.
-        let_pass: Types of the errors that are the caller's fault and are raised as they are.
+    No generator: one that Ctrl-C leaves behind gets a GeneratorExit, which would be blamed as well.
     """
-    try:
-        yield
-    except BaseException as error:
-        if isinstance(error, (KeyboardInterrupt, *let_pass)):
-            raise
-        if isinstance(error, InvalidDomainError) and name in str(error):
-            raise
+
+    def __init__(self, name: str, let_pass: tuple[type[Exception], ...] = ()) -> None:
+        self._name = name
+        self._let_pass = let_pass  # the caller's fault
+
+    def __enter__(self) -> None:
+        """Watch from now on."""
+
+    def __exit__(
+        self, _: type[BaseException] | None, error: BaseException | None, __: TracebackType | None
+    ) -> None:
+        if error is None or isinstance(error, (KeyboardInterrupt, *self._let_pass)):
+            return
+        if isinstance(error, InvalidDomainError) and self._name in str(error):
+            return
         # Also of an exception whose own message fails.
-        *_, said = "".join(format_exception_only(error)).strip().splitlines()
+        *_lines, said = "".join(format_exception_only(error)).strip().splitlines()
         raise InvalidDomainError(
-            f"domain {name!r} cannot be made: {said}; `slap doctor` says what is missing of ours, "
-            f'`python -c "from slap_ros.domains import get_domain; get_domain({name!r})"` where it '
-            "fails"
+            f"domain {self._name!r} cannot be made: {said}; `slap doctor` says what is missing of "
+            f'ours, `python -c "from slap_ros.domains import get_domain; '
+            f'get_domain({self._name!r})"` where it fails'
         ) from error

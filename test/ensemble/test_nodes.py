@@ -220,6 +220,14 @@ def make():
 def main():
     return run_node("late", make)
 """
+MAIN = "import time, rclpy; from ensemble.startup import main_of; "
+ENDINGS = {
+    "at once": MAIN + "exit(main_of('late'))",
+    "slow shutdown": MAIN
+    + "shutdown = rclpy.try_shutdown; rclpy.try_shutdown = lambda: [time.sleep(0.2), shutdown()]; "
+    "exit(main_of('late'))",
+    "slow exit": MAIN + "code = main_of('late'); time.sleep(0.2); exit(code)",
+}
 INTERRUPTED = """
 import os, signal
 from pathlib import Path
@@ -228,13 +236,17 @@ Path(__file__).with_suffix(".done").touch()
 """
 
 
-def test_ctrl_c_waits_for_a_module_that_a_node_imports(network, tmp_path):
-    """What is raised meanwhile is printed by compiled ones, which go on."""
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_ctrl_c_waits_for_a_module_that_a_node_imports(network, tmp_path, ending):
+    """What is raised meanwhile is printed by compiled ones, which go on.
+
+    It is raised afterwards, when the node may be ending already.
+    """
     (tmp_path / "late").mkdir()
     (tmp_path / "late" / "node.py").write_text(INTERRUPTED_IMPORT)
     (tmp_path / "interrupted.py").write_text(INTERRUPTED)
     process = subprocess.run(
-        [sys.executable, "-c", "from ensemble.startup import main_of; exit(main_of('late'))"],
+        [sys.executable, "-c", ENDINGS[ending]],
         env=os.environ
         | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"},
         capture_output=True,
