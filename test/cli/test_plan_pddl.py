@@ -119,6 +119,22 @@ def test_a_cost_that_the_problem_forgets_is_said(tmp_path: Path, planner: str) -
     )
 
 
+def test_a_goal_out_of_reach_names_what_nothing_achieves(tmp_path: Path) -> None:
+    goal = "(and (sent hill) (at r camp) (not (at r hill)) (or (base camp) (sent camp)))"
+    texts = SURVEY, SURVEY_TASK.replace("(sent hill)", goal)
+    result = invoke(tmp_path, texts, "plan")
+    assert result.exit_code == ErrorCode.UNSOLVABLE
+    assert result.stderr.endswith(
+        "nothing that can be done achieves at(r, camp), not at(r, hill)\n"
+    )
+
+
+def test_the_other_definition_is_named(tmp_path: Path) -> None:
+    result = invoke(tmp_path, PAIRS["survey"][::-1], "plan")
+    assert result.exit_code == ErrorCode.MALFORMED_PDDL
+    assert "expected (define (domain NAME) ...), found a problem only" in result.stderr
+
+
 def test_both_definitions_in_one_file(tmp_path: Path) -> None:
     file = tmp_path / "both.pddl"
     file.write_bytes("\n".join(PAIRS["survey"]).encode("utf-8-sig"))
