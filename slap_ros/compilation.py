@@ -90,8 +90,7 @@ def inner(function: Function) -> Function:
 def compiled(function: Function) -> Function:
     """A function that Python calls: compiled once, then loaded from the user's cache."""
     made: Any = inner(function)
-    folder = cache_folder()
-    if folder is not None:
+    if cache_folder() is not None:
         made._cache = _KeptFunction(function)
         _spare(made._cache)
     return cast(Function, made)
