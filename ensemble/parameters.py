@@ -100,7 +100,7 @@ def require_declared(node: Node) -> None:
     if unknown := [name for name in own if not node.has_parameter(name)]:
         names = ", ".join(sorted(set(node.list_parameters([], 0).names) - set(OF_ROS)))
         raise InvalidParameterError(
-            f"{node.get_name()} has no parameter {', '.join(map(repr, unknown))}; it has {names}"
+            f"unknown parameter {', '.join(map(repr, unknown))}; {node.get_name()} has {names}"
         )
 
 
