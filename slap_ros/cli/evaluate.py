@@ -99,12 +99,11 @@ def evaluate(
     library = choose(shortcuts, chosen, planner)
     compared = compared_approaches(library, chosen, samples, with_shooting)
     libraries = _libraries(chosen, shortcuts, library)
-    others = [one for one in against or () if one != SKILLS_ALONE]
-    if len(others) < len(against or ()):
+    rivals = open_chosen_rivals([one for one in against or () if one != SKILLS_ALONE], chosen)
+    if SKILLS_ALONE in (against or ()):
         compared = against_skills(compared, chosen)
         console.print(both_in_words(libraries))
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
-    rivals = open_chosen_rivals(others, chosen)
     results = _run(experiment, compared, jobs)
     run_rivals(experiment, rivals, results[0][1], jobs)
     if output is not None:
