@@ -72,14 +72,13 @@ from acquisition_node.trainer_goal import TrainerGoal
 from acquisition_node.training_request import TrainingRequest, goal_in_words
 from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.answering import error_to_answer
-from ensemble.common_parameters import CommonParameters
+from ensemble.common_parameters import read_with_common
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.episode_tracker import EpisodeTracker
 from ensemble.futures import submit, wait_for_first, wait_until
 from ensemble.interfaces import ACQUIRE_SKILLS, GROW_SKILLS, PROPOSE_OPERATORS
 from ensemble.observation import Episode
-from ensemble.parameters import read_parameters
 from ensemble.patience import load_advice
 from ensemble.refusals import Refusals
 from slap_ros.errors import BusyError, EpisodeChangedError, NoTaskError, TaskCanceledError
@@ -96,8 +95,7 @@ class AcquisitionNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         """Serve all actions; ``kwargs`` are the node's."""
         super().__init__("acquisition_node", **kwargs)
-        self._settings = read_parameters(self, AcquisitionParameters)
-        common = read_parameters(self, CommonParameters)
+        self._settings, common = read_with_common(self, AcquisitionParameters)
         common.imported()
         self._timeout_s = self._settings.task_timeout * common.patience
         self._busy = False

@@ -5,12 +5,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
-from ensemble.parameters import parameter
+from rclpy.node import Node
+
+from ensemble.parameters import declare_parameters, parameter, read_parameters
 from ensemble.patience import IMPATIENT, PATIENT
 from slap_ros.core import Domain
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
+P = TypeVar("P")
 LIBRARIES = "runs/skills"  # where acquisition_node writes
 
 
@@ -41,3 +45,17 @@ class CommonParameters:
 
 
 DEFAULTS = CommonParameters()
+
+
+def read_with_common(node: Node, kind: type[P]) -> tuple[P, CommonParameters]:
+    """Declare the parameters of a node that has the common ones too, and read both.
+
+    Args:
+        node: Node that has just been made.
+        kind: Dataclass of the parameters that are its own.
+
+    Raises:
+        Exception: As :func:`ensemble.parameters.read_parameters`.
+    """
+    own = declare_parameters(node, kind)
+    return own, read_parameters(node, CommonParameters)

@@ -18,6 +18,12 @@ from slap_ros.errors import InvalidParameterError
 P = TypeVar("P")
 MAX_NUMBER = 1e9  # of what has no other limit: seconds and steps as ROS messages have room for
 MAX_SEED = 2**63 - 1
+OF_ROS = ("use_sim_time", "start_type_description_service")  # parameters that ROS declares itself
+OF_TOPICS = "qos_overrides."  # declared with the topics that they are about
+# What says which task all nodes are about, and how long they wait. A block `/**` of a parameter
+# file may set it for all of them: a node that has no such parameter passes it over.
+OF_ENSEMBLE = ("domain", "preset", "skills", "libraries", "patience", "seed", "index", "goal")
+OF_ALL_NODES = (*OF_ROS, *OF_ENSEMBLE)
 
 
 def parameter(default: Any, description: str, low: float = 0.0, high: float = MAX_NUMBER) -> Any:
@@ -48,6 +54,23 @@ def with_default(kind: type, name: str, default: Any) -> Any:
 
 
 def read_parameters(node: Node, kind: type[P]) -> P:
+    """Declare all parameters of a node, and read them.
+
+    Args:
+        node: Node that has just been made.
+        kind: Dataclass of its parameters.
+
+    Raises:
+        rclpy.exceptions.InvalidParameterTypeException: A value was given with another type.
+        InvalidParameterError: A number is not finite or beyond its limits, or a value was given
+            for a parameter that the node does not have.
+    """
+    settings = declare_parameters(node, kind)
+    require_declared(node)
+    return settings
+
+
+def declare_parameters(node: Node, kind: type[P]) -> P:
     """Declare every field of ``kind`` as a read-only parameter and read it.
 
     Raises:
@@ -61,6 +84,24 @@ def read_parameters(node: Node, kind: type[P]) -> P:
         _require_within(f"parameter {item.name} of {node.get_name()}", value, item.metadata)
         values[item.name] = value
     return kind(**values)
+
+
+def require_declared(node: Node) -> None:
+    """Refuse values for parameters that a node does not have, which rclpy passes over silently.
+
+    Args:
+        node: Node that has declared all its parameters.
+
+    Raises:
+        InvalidParameterError: There is such a value.
+    """
+    given = node._parameter_overrides  # rclpy has no public name for them
+    own = [name for name in given if not (name in OF_ALL_NODES or name.startswith(OF_TOPICS))]
+    if unknown := [name for name in own if not node.has_parameter(name)]:
+        names = ", ".join(sorted(set(node.list_parameters([], 0).names) - set(OF_ROS)))
+        raise InvalidParameterError(
+            f"unknown parameter {', '.join(map(repr, unknown))}; {node.get_name()} has {names}"
+        )
 
 
 # What turns a text into a value, by the type of the default, where that is not the type itself.

@@ -112,7 +112,7 @@ def _drive(
 
     if not spinner.spin_until(ready, ready_s):
         raise NotReadyError(
-            f"the ensemble did not come up within {ready_s:.0f} s; try `slap doctor`; or "
+            f"the ensemble did not come up within {ready_s:.3g} s; try `slap doctor`; or "
             f"{load_advice()}"
         )
     failure: SlapError | None = None

@@ -47,7 +47,7 @@ from slap_msgs.msg import ObjectCentricState
 
 from ensemble import encode
 from ensemble.answering import domain_error
-from ensemble.common_parameters import CommonParameters
+from ensemble.common_parameters import read_with_common
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.early_messages import EarlyMessages
 from ensemble.endpoints import subscribe
@@ -56,7 +56,6 @@ from ensemble.episode_tracker import EpisodeTracker
 from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.next_states import NextStates
 from ensemble.observation import Episode
-from ensemble.parameters import read_parameters
 from ensemble.perception_parameters import PerceptionParameters
 from ensemble.refusals import Refusals
 from slap_ros.errors import SlapError
@@ -72,8 +71,7 @@ class PerceptionNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("perception_node", **kwargs)
-        parameters = read_parameters(self, PerceptionParameters)
-        common = read_parameters(self, CommonParameters)
+        parameters, common = read_with_common(self, PerceptionParameters)
         common.imported()
         self._quality, self._seed = parameters.quality, parameters.noise_seed
         self._perceiver: Perceiver

@@ -50,13 +50,13 @@ from rclpy.node import Node
 from slap_msgs.action import SolveTask
 
 from ensemble.answering import error_to_answer
-from ensemble.common_parameters import CommonParameters
+from ensemble.common_parameters import read_with_common
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import run_in_executor
 from ensemble.interfaces import EXECUTE_SKILL, SOLVE_TASK
 from ensemble.observation import Episode, Observation
-from ensemble.parameters import parameter, read_parameters
+from ensemble.parameters import parameter
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from ensemble.state_synchronizer import StateSynchronizer
 from planner_node.plan_publisher import PlanPublisher
@@ -96,9 +96,8 @@ class PlannerNode(Node):
             InvalidParameterError: There is no planner of the name that is given.
         """
         super().__init__("planner_node", **kwargs)
-        self._settings = read_parameters(self, PlannerParameters)
+        self._settings, common = read_with_common(self, PlannerParameters)
         require_planner(self._settings.planner)
-        common = read_parameters(self, CommonParameters)
         self._patience = common.patience
         self._shortcuts = ShortcutProvider(self, self._settings, self._settings.planner)
         self._shortcuts.prepare(common.imported())

@@ -48,14 +48,14 @@ from slap_msgs.srv import ListSkills
 
 from ensemble import encode
 from ensemble.answering import error_to_answer
-from ensemble.common_parameters import CommonParameters
+from ensemble.common_parameters import read_with_common
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import run_in_executor
 from ensemble.interfaces import EXECUTE_SKILL, LIST_SKILLS, PLAN_EVENTS
 from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
-from ensemble.parameters import parameter, read_parameters
+from ensemble.parameters import parameter
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from ensemble.state_synchronizer import StateSynchronizer
 from ensemble.steady_time import create_timer
@@ -81,8 +81,7 @@ class SkillServer(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("skill_server", **kwargs)
-        self._settings = read_parameters(self, SkillServerParameters)
-        common = read_parameters(self, CommonParameters)
+        self._settings, common = read_with_common(self, SkillServerParameters)
         self._state_timeout_s = self._settings.state_timeout * common.patience
         self._shortcuts = ShortcutProvider(self, self._settings)
         self._shortcuts.prepare(common.imported())

@@ -90,8 +90,7 @@ def inner(function: Function) -> Function:
 def compiled(function: Function) -> Function:
     """A function that Python calls: compiled once, then loaded from the user's cache."""
     made: Any = inner(function)
-    folder = cache_folder()
-    if folder is not None:
+    if cache_folder() is not None:
         made._cache = _KeptFunction(function)
         _spare(made._cache)
     return cast(Function, made)
@@ -157,7 +156,14 @@ def compile_once(calls: Iterable[Callable[[], object]]) -> None:
         calls: A call of every compiled function.
     """
     folder = cache_folder()
-    if folder is None or is_compiled():
+    if folder is None:
+        logger.warning(
+            "machine code cannot be kept in %s: this process compiles motion planning for itself, "
+            "for up to half a minute. Set XDG_CACHE_HOME to a folder that can be written",
+            _cache(),
+        )
+        return
+    if is_compiled():
         return
     with _lock(folder):
         if not is_compiled():
@@ -170,13 +176,17 @@ def compile_once(calls: Iterable[Callable[[], object]]) -> None:
 @cache
 def cache_folder() -> Path | None:
     """The folder of the machine code; None where none can be written."""
-    base = Path(_config.CACHE_DIR) if _config.CACHE_DIR else user_cache("kernels")
-    folder = base / _digest()
+    folder = _cache() / _digest()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # it is executed
     except OSError:
         return None
     return folder if os.access(folder, os.W_OK) else None
+
+
+def _cache() -> Path:
+    """The folder of all machine code, of other versions and processors too."""
+    return Path(_config.CACHE_DIR) if _config.CACHE_DIR else user_cache("kernels")
 
 
 def _digest() -> str:

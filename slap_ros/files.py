@@ -98,6 +98,17 @@ def require_writable(path: Path) -> None:
         raise OSError(error.errno, os.strerror(error.errno or errno.EIO), str(path)) from error
 
 
+def require_writable_folder(path: Path) -> None:
+    """Check the same for a folder alone.
+
+    Raises:
+        OSError: As :func:`require_writable`, or there is a file in its place.
+    """
+    if path.is_file():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
+    require_writable(path)
+
+
 def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
     """The content of a regular file.
 

@@ -28,6 +28,7 @@ LIBRARIES = (
     "matplotlib",
 )
 SOURCE = (".", ":(exclude)docs")
+CHANGED = "-dirty"  # how the revision ends of sources that were changed since
 
 
 @lru_cache(maxsize=1)
@@ -68,7 +69,7 @@ def revision_of(root: Path) -> str:
         changed = _git(root, "status", "--porcelain", "--untracked-files=no", "--", *SOURCE)
     except (OSError, subprocess.SubprocessError):
         return "unknown"  # no git here, or not its repository
-    return f"{described}-dirty" if changed else described
+    return f"{described}{CHANGED}" if changed else described
 
 
 def _git(root: Path, *arguments: str) -> str:

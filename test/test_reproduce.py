@@ -71,6 +71,8 @@ def test_other_numbers_are_found_and_times_are_not_compared():
     assert list(differences(published, same)) == []
     assert list(differences(published, other)) == ["found.rows[0].steps"]
     assert list(differences(published, {"rows": []})) == ["found.rows"]
+    trained = [{"trained": [{"episodes": 5, "cpu_s": seconds}]} for seconds in (70.0, 80.0)]
+    assert list(differences(*trained)) == []
 
 
 def test_a_figure_that_is_not_there():

@@ -6,7 +6,8 @@
 
 It shares no code with the planner. The files are read as nested lists, states are sets of atoms,
 and conditions are judged by recursion, straight from the text. A plan has a line for each operator,
-as ``slap plan`` prints it: ``drive(truck, depot, shop)``. Other lines are left out.
+as ``slap plan`` prints it: ``drive(truck, depot, shop)``; or as competitions write it, maybe with
+its time and duration: ``0: (drive truck depot shop) [1]``. Comments begin with a semicolon.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from typing import Any
 
 Atom = tuple[str, ...]
 Tree = Any  # a word, or a list of trees
-_STEP = re.compile(r"^\s*([^\s(]+)\((.*)\)\s*$")
+_PRINTED = re.compile(r"([^\s(]+)\((.*)\)")
+_COMPETITIONS = re.compile(r"(?:[\d.]+\s*:\s*)?\(\s*([^\s()]+)([^()]*)\)(?:\s*\[[\d.]+\])?")
 _WORDS = re.compile(r"\(|\)|:[^\s()?:]*|-(?=[a-z])|\?[^\s()?]+|[^\s()?]+")
 
 
@@ -213,16 +215,36 @@ def check(world: World, steps: list[tuple[str, list[str]]]) -> float:
 
 
 def read_steps(text: str) -> list[tuple[str, list[str]]]:
-    """The steps of a plan as it is printed."""
-    matches = filter(None, map(_STEP.match, text.lower().splitlines()))
-    return [(m[1], [word.strip() for word in m[2].split(",") if word.strip()]) for m in matches]
+    """The steps of a plan: names of operators, each with its objects.
+
+    Raises:
+        InvalidPlanError: A line is no step.
+    """
+    steps = []
+    for number, line in enumerate(text.lower().splitlines(), start=1):
+        if not (step := line.split(";")[0].strip()):
+            continue
+        if found := _COMPETITIONS.fullmatch(step):
+            steps.append((found[1], found[2].split()))
+        elif found := _PRINTED.fullmatch(step):
+            steps.append((found[1], found[2].replace(",", " ").split()))
+        else:
+            raise InvalidPlanError(f"line {number} is no step: {step}")
+    return steps
 
 
 def main() -> int:
     """Check the plan of the command line."""
-    domain, problem, plan = (Path(word).read_text(encoding="utf-8") for word in sys.argv[1:4])
-    steps = read_steps(plan)
+    if len(sys.argv) != 4:
+        sys.stderr.write("give domain.pddl problem.pddl plan.txt\n")
+        return 2
     try:
+        domain, problem, plan = (Path(word).read_text(encoding="utf-8") for word in sys.argv[1:])
+    except (OSError, UnicodeDecodeError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    try:
+        steps = read_steps(plan)
         cost = check(World.read(domain, problem), steps)
     except InvalidPlanError as error:
         sys.stdout.write(f"invalid: {error}\n")

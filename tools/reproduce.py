@@ -151,7 +151,7 @@ def differences(published: Any, again: Any, where: str = "found") -> Iterator[st
     """Where results differ, times apart, and what newer versions add."""
     if isinstance(published, dict) and isinstance(again, dict):
         for key, value in published.items():
-            if not key.endswith("seconds"):
+            if not key.endswith(("seconds", "cpu_s")):
                 yield from differences(value, again.get(key), f"{where}.{key}")
     elif isinstance(published, list) and isinstance(again, list) and len(published) == len(again):
         for i, (one, other) in enumerate(zip(published, again, strict=True)):

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -88,20 +88,43 @@ def run_task(options: RunOptions) -> int:
     with _bag(options) as bag:
         settings = replace(request.settings, record=bag)
         metrics = _run(replace(request, settings=settings), options, keep_states)
-        if options.json:
-            print_json(metrics.as_json())
         # Another run has taken the name meanwhile: the bag there is that one's.
-        has_bag = metrics.error_code != ErrorCode.BAG_EXISTS
-        _conclude(metrics, options.record if has_bag else None, options.json)
-        code = 0
-        if bag is not None and has_bag and options.report is not None:
-            from slap_ros.cli.report import write_report
+        if metrics.error_code == ErrorCode.BAG_EXISTS:
+            bag = None
+        # Whoever waits for the outcome finds the files that are named; it is told without them too.
+        try:
+            code = _write_files(options, domain, bag, states)
+        finally:
+            _conclude(metrics, options.record if bag is not None else None, options.json)
+    return int(metrics.error_code) or code
 
-            code = write_report([bag], options.report)
+
+def _write_files(
+    options: RunOptions, domain: Domain, bag: Path | None, states: Sequence[StateMessage]
+) -> int:
+    """Write the report and the animation that are asked for.
+
+    Args:
+        options: Options of the command.
+        domain: Domain that ran.
+        bag: Bag of the run; None where there is none.
+        states: States of the run, for the animation.
+
+    Returns:
+        The exit code of the report.
+
+    Raises:
+        SlapError: A file cannot be written, or the bag not be read.
+    """
+    code = 0
+    if bag is not None and options.report is not None:
+        from slap_ros.cli.report import write_report
+
+        code = write_report([bag], options.report)
     if options.render is not None:
         decoded = [decode_state(message, domain.types_by_name) for message in states]
         write_animation(domain, decoded, options.render, picture_size(options.size))
-    return int(metrics.error_code) or code
+    return code
 
 
 def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -> RunRequest:
@@ -203,7 +226,7 @@ def _check_world(options: RunOptions, domain: Domain, task: Task) -> bool:
     if options.world == SIM:
         return False
     # Physics is needed only here: planar domains run without it.
-    from slap_ros.robot.scene_config import chosen_scene_config
+    from slap_ros.robot.scene_config import chosen_scene_config, read_scene_config
     from slap_ros.robot.servoed_robot import is_servoed, require_servoed
     from slap_ros.robot.usable_domains import require_robot
 
@@ -214,6 +237,8 @@ def _check_world(options: RunOptions, domain: Domain, task: Task) -> bool:
         require_servoed(domain, scene)
     else:
         require_robot(domain, task.initial_state)
+        if options.scene is not None:
+            read_scene_config(options.scene, domain)
     if options.world == MUJOCO:
         require_mujoco()
         _require_camera(options, domain)
@@ -341,6 +366,8 @@ def _event_view(live: bool) -> AbstractContextManager[OnMessage]:
 
 
 def _conclude(metrics: RunMetrics, record: Path | None, json: bool) -> None:
+    if json:
+        print_json(metrics.as_json())
     if metrics.success:
         tell = console.print if json else print_result  # the JSON has it too
         tell(

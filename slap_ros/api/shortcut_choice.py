@@ -21,6 +21,7 @@ from slap_ros.shortcuts.shipped import (
     require_same_skills,
 )
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
+from slap_ros.whole_numbers import require_whole
 
 SAMPLES = DEFAULT.samples
 Shortcuts = str | Path | ShortcutLibrary | None  # the word shipped, a folder, a library, or none
@@ -81,8 +82,7 @@ def sampling(samples: int) -> Sampling:
     """The default sampling with so many attempts.
 
     Raises:
-        InvalidParameterError: There would be none.
+        InvalidParameterError: There would be none, or it is no whole number.
     """
-    if samples < 1:
-        raise InvalidParameterError(f"samples is {samples}; it must be at least 1")
+    require_whole("samples", samples, least=1)
     return replace(DEFAULT, samples=samples)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from slap_ros.api.shortcut_check import ShortcutCheck, check_shortcuts
@@ -13,6 +14,7 @@ from slap_ros.cli.skill_choice import open_chosen
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.versions import CHANGED
 
 
 def check_library(
@@ -38,7 +40,14 @@ def check_library(
     Returns:
         The exit code: 0 if every shortcut holds.
     """
-    learned_in = load_library(library, get_domain(domain, preset)).record.get("preset")
+    record = load_library(library, get_domain(domain, preset)).record
+    made_by = record.get("versions")
+    if isinstance(made_by, Mapping) and str(made_by.get("revision")).endswith(CHANGED):
+        warn(
+            f"{library} was made by {made_by['revision']}: sources with changes that were not "
+            "committed, from which nobody else can make it again"
+        )
+    learned_in = record.get("preset")
     chosen = open_chosen(domain, preset or (str(learned_in) if learned_in else None), skills)
     with console.status(f"checking {library}") as status:
         found = check_shortcuts(

@@ -23,7 +23,7 @@ from slap_ros.api.library_descriptions import both_in_words, describe_library, d
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.cli.options import EffortFactor, Goal, Json, NoImprove, Planner, Within, at_most
-from slap_ros.cli.rivals import Against, RivalResults, run_rivals
+from slap_ros.cli.rivals import Against, RivalResults, open_chosen_rivals, run_rivals
 from slap_ros.cli.shortcuts import choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
@@ -99,13 +99,13 @@ def evaluate(
     library = choose(shortcuts, chosen, planner)
     compared = compared_approaches(library, chosen, samples, with_shooting)
     libraries = _libraries(chosen, shortcuts, library)
-    others = [one for one in against or () if one != SKILLS_ALONE]
-    if len(others) < len(against or ()):
+    rivals = open_chosen_rivals([one for one in against or () if one != SKILLS_ALONE], chosen)
+    if SKILLS_ALONE in (against or ()):
         compared = against_skills(compared, chosen)
         console.print(both_in_words(libraries))
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
-    rivals = run_rivals(experiment, others, results[0][1], jobs)
+    run_rivals(experiment, rivals, results[0][1], jobs)
     if output is not None:
         origin = {"command": command, "domain": domain} | settings | libraries | rivals.described
         write_evaluation(output, origin, results + rivals.results)

@@ -24,7 +24,7 @@ from slap_ros.cli.options import (
 )
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import require_writable
+from slap_ros.files import require_writable_folder
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
 from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.skills.domain_choice import SHIPPED
@@ -81,7 +81,7 @@ def plan(
     from slap_ros.core import task_with_goal
 
     if output is not None:
-        require_writable(output)
+        require_writable_folder(output)
     planner = with_settings(planner, within, effort)
     chosen = open_chosen(domain, preset, skills)
     task = task_with_goal(chosen, seed_or_default(seed), index, goal)

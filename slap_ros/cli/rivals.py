@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +15,10 @@ from slap_ros.cli.console import console, styled
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Summary
+
+if TYPE_CHECKING:
+    from slap_ros.baselines.trials import Rival
+    from slap_ros.core import Domain
 
 Against = Annotated[
     list[str] | None,
@@ -32,11 +36,13 @@ class RivalResults:
     """What came of the baselines.
 
     Args:
+        baselines: Those that can be used, by name.
         results: Summary and trials of each.
         described: What a file of results says of them; empty where there are none.
         refused: Number of folders that could not be used.
     """
 
+    baselines: Mapping[str, Rival] = field(default_factory=dict)
     results: list[tuple[Summary, list[Trial]]] = field(default_factory=list)
     described: dict[str, Any] = field(default_factory=dict)
     refused: int = 0
@@ -52,30 +58,43 @@ class RivalResults:
         return int(ErrorCode.INVALID_LIBRARY if self.refused else ErrorCode.NONE)
 
 
+def open_chosen_rivals(rivals: Sequence[str], domain: Domain) -> RivalResults:
+    """Open the rivals before anything is planned, and say which cannot be used.
+
+    Args:
+        rivals: Folders of baselines, and policies as ``module:function``.
+        domain: Domain that they must be of.
+
+    Returns:
+        Those that can be used, without results so far.
+    """
+    found = RivalResults()
+    if rivals:
+        from slap_ros.api.baselines import open_rivals
+
+        found.baselines = open_rivals(rivals, domain, found.complain)
+    return found
+
+
 def run_rivals(
-    experiment: Experiment, rivals: Sequence[str], yardstick: Sequence[Trial], jobs: int
-) -> RivalResults:
+    experiment: Experiment, found: RivalResults, yardstick: Sequence[Trial], jobs: int
+) -> None:
     """Let each rival act in every task.
 
     Args:
         experiment: Tasks to solve.
-        rivals: Folders of baselines, and policies as ``module:function``.
+        found: Rivals that were opened, which receives their results.
         yardstick: Trials of pure planning on the same tasks.
         jobs: Number of processes.
-
-    Returns:
-        What came of those that can be used, and how many cannot.
     """
-    found = RivalResults()
-    if not rivals:
-        return found
-    from slap_ros.api.baselines import describe_rival, open_rivals, run_baseline
+    if not found.baselines:
+        return
+    from slap_ros.api.baselines import describe_rival, run_baseline
 
-    baselines = open_rivals(rivals, experiment.domain, found.complain)
     with counting_bars() as bar:
-        total = len(experiment) * len(baselines)
+        total = len(experiment) * len(found.baselines)
         watched = bar.add_task("baselines", total=total)
-        for name, baseline in baselines.items():
+        for name, baseline in found.baselines.items():
             try:
                 trials = run_baseline(experiment, baseline, jobs, lambda _: bar.advance(watched))
             except SlapError as error:
@@ -85,7 +104,6 @@ def run_rivals(
             found.described.setdefault("against", {})[name] = describe_rival(baseline)
             for reason, count in _reasons(trials).items():
                 console.print(f"{name}: {count} of {len(trials)} tasks not solved: {reason}")
-    return found
 
 
 def _reasons(trials: Sequence[Trial]) -> dict[str, int]:

@@ -296,10 +296,8 @@ class Domain(ShownInNotebooks):
         if goal is None:
             return self._drawn(rng)
         if goal not in self.goals:
-            raise UnknownGoalError(
-                f"domain {self.name} has no goal {goal!r}; there are "
-                f"{', '.join(self.goals) or 'none with a name'}"
-            )
+            named = ", ".join(self.goals) or "none with a name, only atoms, such as (Near a b)"
+            raise UnknownGoalError(f"domain {self.name} has no goal {goal!r}; there are {named}")
         for _ in range(MOST_DRAWN - 1):
             with suppress(UnknownObjectError):
                 return self._posed(self._drawn(rng), goal)

@@ -12,6 +12,7 @@ nobody else's.
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from importlib import import_module
@@ -132,7 +133,8 @@ def _make(name: str, preset: str) -> Domain:
     with _Blame(name, let_pass=(InvalidParameterError,)):
         domain = factory(base, changes)
         if not isinstance(domain, Domain):
-            raise InvalidDomainError(f"domain {name!r} made {domain!r}, which is not a Domain")
+            made = reprlib.repr(domain)  # not all of a large one
+            raise InvalidDomainError(f"domain {name!r} made {made}, which is not a Domain")
         if domain.name != name:
             raise InvalidDomainError(
                 f"domain {name!r} calls itself {domain.name!r}; give the entry point that name"

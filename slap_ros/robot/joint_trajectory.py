@@ -106,10 +106,11 @@ class JointSpline:
             return self.end
         piece = max(0, int(np.searchsorted(self._times, time_s, side="right")) - 1)
         after = time_s - self._times[piece]
-        *rest, found = self._pieces[piece]
-        for coefficients in reversed(rest):  # Horner: the same bits on every processor
-            found = found * after + coefficients
-        return np.asarray(found)
+        coefficients = self._pieces[piece]
+        found: Array = coefficients[-1]
+        for lower in coefficients[-2::-1]:  # Horner: the same bits on every processor
+            found = found * after + lower
+        return found
 
 
 Knot = tuple[float, Array, Array | None, Array | None]

@@ -30,7 +30,8 @@ def require_robot(domain: Domain, initial: State) -> None:
         )
     if ROBOT not in domain.types or not isinstance(domain.make_world(initial), PandaWorld):
         raise InvalidParameterError(
-            f"{domain.name} has no Panda, which the robots here are; use --world sim"
+            f"{domain.name} has no Panda, which the robots here are: it runs in simulation alone "
+            "(--world sim)"
         )
 
 

@@ -165,6 +165,20 @@ def contents(folder):
     }
 
 
+def test_sources_that_were_changed_are_named(trained, tmp_path):
+    library = shutil.copytree(trained.folder / "library", tmp_path / "library")
+    file = library / "library.json"
+    about = json.loads(file.read_text())
+    warnings = []
+    for revision in ("0123456789ab", "0123456789ab-dirty"):
+        about["versions"]["revision"] = revision
+        file.write_text(json.dumps(about))
+        answer = check(library, trained.folder / "steady")
+        assert answer.exit_code == 0, answer.output
+        warnings.append("by 0123456789ab-dirty: sources with changes" in answer.stderr)
+    assert warnings == [False, True]
+
+
 def test_shortcuts_that_hold_over_other_skills_are_used_with_them(trained, tmp_path):
     """And with no others; whoever uses them is told both digests."""
     library = shutil.copytree(trained.folder / "library", tmp_path / "library")

@@ -150,6 +150,7 @@ def test_a_plan_that_leads_nowhere_is_replaced(domain, task, plan):
         (lambda domain, _: slap_ros.evaluate(domain, seeds=1.5), "a whole number, not 1.5"),
         (lambda domain, _: slap_ros.evaluate(domain, first_seed=-1), "first_seed must be at"),
         (lambda domain, _: domain.task(seed="1"), "seed must be a whole number, not '1'"),
+        (lambda domain, _: slap_ros.plan(domain, domain.task(1), samples=1.5), "number, not 1.5"),
         (lambda domain, _: domain.task(seed=1, index=-1), "index must be at least 0, not -1"),
         (lambda domain, folder: slap_ros.train(domain, folder, seed=-1), "seed must be at least"),
     ],

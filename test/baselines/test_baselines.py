@@ -28,6 +28,7 @@ from support.marks import slow
 SHORT = {"n_envs": 2, "n_steps": 32, "batch_size": 32, "n_epochs": 1, "validation": 1}
 
 EVALUATE = ["evaluate", "obstacle2d", "--preset", "paper", "--seeds", "1", "--shortcuts", "none"]
+IMPOSSIBLE = "(and (On block1 table) (On block1 target))"
 
 
 @pytest.fixture(scope="module")
@@ -269,6 +270,13 @@ def test_what_cannot_be_used_is_named_and_the_rest_is_computed(tmp_path, trained
     assert "policy.safetensors: damaged" in complaints
     assert "nowhere: no trained baseline; `slap baseline train METHOD obstacle2d`" in complaints
     assert [row["approach"] for row in json.loads(said)["approaches"]] == ["pure_planning", "ppo"]
+
+
+def test_what_cannot_be_used_is_named_before_planning_begins(tmp_path):
+    _, _, complaints = slap(
+        *EVALUATE, "--tasks", 1, "--goal", IMPOSSIBLE, "--against", tmp_path / "nowhere"
+    )
+    assert 0 < complaints.index("nowhere: no trained baseline") < complaints.index("not solved: ")
 
 
 CODE = """

@@ -4,12 +4,15 @@
 
 import re
 import shlex
+from pathlib import Path
 
 import pytest
 
 from ensemble.cli.application import COMMANDS
 from slap_ros.cli.help_pages import PANELS
 from support.slap_command import slap
+
+ROOT = Path(__file__).parents[2]
 
 
 def leaves(command, path):
@@ -33,6 +36,21 @@ def test_every_command_has_an_example_that_it_understands(commands):
         said, arguments = words[:depth], words[depth:]
         assert " ".join(said) == f"slap {path}"
         command.make_context(path, arguments)
+
+
+def test_every_command_on_a_page_is_understood(commands):
+    """Lines of code alone: a command in a sentence may lack what the sentence is not about."""
+    wrong = []
+    for page in (ROOT / "README.md", *ROOT.glob("docs/*.md")):
+        text = re.sub(r"\\\n\s*", " ", page.read_text(encoding="utf-8"))
+        for line in re.findall(r"^    slap (.*)$", text, re.MULTILINE):
+            words = shlex.split(line, comments=True)
+            path = next(p for p in (" ".join(words[:2]), words[0]) if p in commands)
+            try:
+                commands[path].make_context(path, words[1 + path.count(" ") :])
+            except Exception as error:
+                wrong.append(f"{page.name}: slap {line}: {error}")
+    assert not wrong
 
 
 def test_every_panel_is_of_an_option_that_there_is(commands):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from slap_ros.errors import ErrorCode
 from slap_ros.relational.pddl import parse_domain, parse_problem
 from support.slap_command import slap
 from tools.check_plan import World, check, read_steps
+
+ROOT = Path(__file__).parents[2]
 
 # A rover sends what it sampled from where it stands: often from where it sampled it.
 SURVEY = """(define (domain survey) (:types rover spot)
@@ -98,6 +101,44 @@ def test_a_plan_that_is_redirected_can_be_checked(tmp_path: Path) -> None:
     assert result.stderr == "2 operators\n"
 
 
+COMPETITIONS = """; a plan as other planners write it
+0.000: (SAMPLE r hill) [1.000]
+
+(send r hill hill camp)
+; cost = 2 (unit cost)
+"""
+
+
+def check_by_command(plan: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tools.check_plan", plan.with_name("domain.pddl")]
+    return subprocess.run(
+        [*command, plan.with_name("problem.pddl"), plan], capture_output=True, text=True, cwd=ROOT
+    )
+
+
+@pytest.mark.parametrize(
+    ("plan", "code", "words"),
+    [
+        (COMPETITIONS, 0, "valid: 2 steps"),
+        ("sample(r, hill)\nsent hill\n", 1, "invalid: line 2 is no step: sent hill"),
+        ("(send r hill hill camp)", 1, "invalid: step 1: send(r, hill, hill, camp) is not poss"),
+        (None, 2, "No such file or directory"),
+    ],
+    ids=["as others write", "no step", "not possible", "no file"],
+)
+def test_plans_of_others_are_checked(
+    tmp_path: Path, plan: str | None, code: int, words: str
+) -> None:
+    for name, text in zip(("domain", "problem"), PAIRS["survey"], strict=True):
+        (tmp_path / f"{name}.pddl").write_text(text, encoding="utf-8")
+    if plan is not None:
+        (tmp_path / "plan.txt").write_text(plan, encoding="utf-8")
+    checked = check_by_command(tmp_path / "plan.txt")
+    assert checked.returncode == code, checked.stderr
+    assert words in checked.stdout + checked.stderr
+    assert "Traceback" not in checked.stderr
+
+
 def test_costs_are_minimised_and_said(tmp_path: Path) -> None:
     found = planned(tmp_path, PAIRS["haulage"])
     assert found["cost"] == 8
@@ -117,6 +158,22 @@ def test_a_cost_that_the_problem_forgets_is_said(tmp_path: Path, planner: str) -
     assert result.stderr.endswith(
         "; left out, as :init does not give what their cost is made of: drive(t, x, y) and 1 more\n"
     )
+
+
+def test_a_goal_out_of_reach_names_what_nothing_achieves(tmp_path: Path) -> None:
+    goal = "(and (sent hill) (at r camp) (not (at r hill)) (or (base camp) (sent camp)))"
+    texts = SURVEY, SURVEY_TASK.replace("(sent hill)", goal)
+    result = invoke(tmp_path, texts, "plan")
+    assert result.exit_code == ErrorCode.UNSOLVABLE
+    assert result.stderr.endswith(
+        "nothing that can be done achieves at(r, camp), not at(r, hill)\n"
+    )
+
+
+def test_the_other_definition_is_named(tmp_path: Path) -> None:
+    result = invoke(tmp_path, PAIRS["survey"][::-1], "plan")
+    assert result.exit_code == ErrorCode.MALFORMED_PDDL
+    assert "expected (define (domain NAME) ...), found a problem only" in result.stderr
 
 
 def test_both_definitions_in_one_file(tmp_path: Path) -> None:
@@ -145,6 +202,13 @@ def test_proposed_operators_follow_the_standard(tmp_path: Path) -> None:
     stated = parse_domain(written[0])
     found = plan_symbolically(stated, parse_problem(written[1], stated))
     assert len(found.steps) == 2
+
+
+def test_operators_of_a_file_may_be_in_capitals(tmp_path: Path) -> None:
+    file = tmp_path / "operators.pddl"
+    file.write_text(f"; by hand\n{SURVEY.replace('(define (', '(DEFINE (')}", encoding="utf-8")
+    result = invoke(tmp_path, PAIRS["survey"], "propose", "--operators", str(file))
+    assert result.exit_code == 0, result.stderr
 
 
 def test_operators_of_a_file_may_say_that_parameters_differ(tmp_path: Path) -> None:

@@ -176,6 +176,17 @@ def test_a_robot_is_for_domains_with_a_panda():
         assert "no Panda" in result.stderr
 
 
+@pytest.mark.parametrize("world", ["robot", "mujoco"])
+def test_a_scene_that_cannot_be_read_starts_nothing(tmp_path, world):
+    if world == "mujoco":
+        pytest.importorskip("mujoco")
+    scene = tmp_path / "scene.yaml"
+    result = answer("run", "obstacle_tower", "--world", world, "--scene", scene)
+    assert result.exit_code == ErrorCode.INVALID_SCENE
+    (line,) = result.stderr.splitlines()  # no word of a node
+    assert f"scene file {scene} cannot be read" in line
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -191,6 +202,7 @@ def test_a_robot_is_for_domains_with_a_panda():
         ("run", "obstacle2d", "--record", "file/below"),
         ("run", "obstacle_tower", "--render", "pipe.gif"),
         ("plan", "obstacle2d", "--output", "x" * 300),
+        ("plan", "obstacle2d", "--output", "file"),
     ],
     ids=lambda arguments: " ".join(arguments)[:40],
 )

@@ -9,8 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.errors import ErrorCode
 
 BAG = Path(__file__).parent.parent / "bags" / "data" / "recorded_by_0.1.0"
+RUN = ["run", "obstacle2d", "--in-process", "--shortcuts", "none", "--seed", "1"]
 SEED_LINE = "seed 0 (the default; --seed N for another task)"
 
 
@@ -47,6 +49,20 @@ def test_missing_folders_of_an_output_are_made(command, file, tmp_path):
     ran = slap(*command, "--output", str(output))
     assert ran.exit_code == 0, ran.stderr
     assert output.stat().st_size > 0
+
+
+def test_the_outcome_comes_with_the_files_and_without_them(network, tmp_path):
+    """Whoever waits for the outcome may open the report; one that fails hides no outcome."""
+    (tmp_path / ".b.html.tmp").mkdir()  # a draft's name: only writing it shows that it cannot be
+    for name, code in (("a", 0), ("b", ErrorCode.STORAGE_FULL)):
+        page = tmp_path / f"{name}.html"
+        ran = slap(*RUN, "--report", str(page), "--render", str(tmp_path / f"{name}.gif"))
+        assert ran.exit_code == code, ran.stderr
+        assert ran.stdout.startswith("solved in ")
+        assert page.exists() == (code == 0)
+        if code == 0:
+            written = [ran.output.index(f"{page}"), ran.output.index("a.gif")]
+            assert max(written) < ran.output.index("solved in ")
 
 
 def test_list_is_domains():

@@ -545,7 +545,9 @@ def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path)
         (["planner_node", "-p", "planner:=ff", "-p", f"shortcuts:={LIBRARY}"], 15, "planner ff"),
         (["skill_server", "-p", "shortcuts:=/nowhere"], 17, "/nowhere: no shortcut library"),
         (["skill_server", "-p", "samples:=0"], 15, "samples must be at least 1"),
-        (["recorder_node"], 15, "must name the folder"),
+        (["sim_node", "-p", "domian:=moon"], 15, "'domian'; sim_node has domain, goal, index"),
+        (["planner_node", "-p", "sampels:=2"], 15, "planner_node has domain, libraries"),
+        (["recorder_node", "-p", "use_sim_time:=false", "-p", "seed:=3"], 15, "must name the"),
         (["recorder_node", "-p", "bag:=/tmp"], 93, "/tmp exists"),
     ],
 )

@@ -13,6 +13,7 @@ from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.camera_parameters import TagDetectorParameters
 from ensemble.common_parameters import CommonParameters
 from ensemble.nodes import BEFORE_FRANKA_SIM, RunSettings, node_parameters
+from ensemble.parameters import OF_ENSEMBLE
 from ensemble.perception_parameters import PerceptionParameters
 from ensemble.robot_parameters import (
     FrankaDriverParameters,
@@ -21,6 +22,7 @@ from ensemble.robot_parameters import (
     RobotBridgeParameters,
     ServoBridgeParameters,
 )
+from ensemble.world_parameters import WorldParameters
 from planner_node.node import PlannerParameters
 from recorder_node.node import RecorderParameters
 from sim_node.node import SimParameters
@@ -71,6 +73,11 @@ def test_every_parameter_that_a_file_sets_is_one_of_its_node_and_of_its_type(nam
         for key, value in values.items():
             assert key in defaults, (node, key)
             assert type(as_default(value)) is type(as_default(defaults[key])), (node, key)
+
+
+def test_a_block_for_all_nodes_may_set_what_the_ensemble_is_about():
+    about = {item.name for kind in (CommonParameters, WorldParameters) for item in fields(kind)}
+    assert set(OF_ENSEMBLE) == about
 
 
 def test_the_file_of_all_nodes_has_their_defaults():

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -14,17 +15,21 @@ import pytest
 from slap_ros.errors import ErrorCode, InvalidCassetteError
 from slap_ros.language.cassette import open_client, read_cassette
 from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.lg_sail.imitation import ImitationOptions
 from slap_ros.studies.lg_sail.model_attempts import LanguageModel, ModelsOnly
 from slap_ros.studies.lg_sail.model_options import ModelOptions
+from slap_ros.studies.lg_sail.models import SeveralModelsOptions
 from slap_ros.studies.lg_sail.planning_ablation import (
     ALONE,
     ONE_SHOT,
     PAPER,
     SEARCH,
+    VariantOptions,
 )
 from slap_ros.studies.lg_sail.planning_ablation import study as planning_ablation
-from slap_ros.studies.lg_sail.reward_ablation import FULL, HEADERS
+from slap_ros.studies.lg_sail.reward_ablation import FULL, HEADERS, RewardOptions
 from slap_ros.studies.lg_sail.reward_ablation import study as reward_ablation
+from slap_ros.studies.registry import STUDIES
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport, write
 from slap_ros.studies.study_log import StudyLog
 from support.model_answers import SETTINGS, decomposition_json, operator_json, plan_json
@@ -210,6 +215,33 @@ def test_a_page_names_the_day_and_the_recording(tmp_path: Path) -> None:
     assert digest in (tmp_path / "models_pegs.md").read_text()
     assert json.loads((tmp_path / "models_pegs.json").read_text())["recording_sha256"] == digest
     assert set(ModelOptions(domain="pegs").dated(report).circumstances) == {"answered_on"}
+
+
+@pytest.mark.parametrize(
+    ("study", "options"),
+    [
+        ("planning_ablation", VariantOptions),
+        ("models", SeveralModelsOptions),
+        ("reward_ablation", RewardOptions),
+        ("imitation", ImitationOptions),
+    ],
+)
+def test_the_command_on_a_page_repeats_what_was_recorded(tmp_path, study, options) -> None:
+    if study == "imitation":
+        pytest.importorskip("torch")
+    commands = []
+    for cassette in ("live", f"record:{tmp_path / 'my answers.jsonl'}"):
+        asked = options(
+            domain="stack_at_target", model=["m"], base_url="http://127.0.0.1:9", cassette=cassette
+        )
+        ready = STUDIES[study].prepare(asked, lambda _: None)
+        origin = Provenance.of_command(study, asked.domain, ready.settings, ready.given)
+        commands.append(shlex.split(origin.command))
+    live, recorded = commands
+    assert "--cassette" not in live
+    at = recorded.index("--cassette")
+    assert recorded[at + 1] == f"replay:{tmp_path / 'my answers.jsonl'}"
+    assert recorded[:at] + recorded[at + 2 :] == live
 
 
 def test_the_command_refuses_what_cannot_be() -> None:

@@ -238,6 +238,12 @@ print(arm_frames(np.zeros((1, 7))).shape)
     assert result(done)[0] == ["(1,", "7,", "4,", "4)"]
 
 
+def test_where_no_cache_can_be_written_it_is_said():
+    program = "from slap_ros.compilation import compile_once; compile_once([])"
+    _, err = result(run(program, XDG_CACHE_HOME="/dev/null"))
+    assert "cannot be kept in /dev/null/slap_ros/kernels" in err
+
+
 SOURCES = Path(slap_ros.__file__).parent
 PART = """
 import numpy as np

@@ -68,6 +68,7 @@ def test_whatever_is_raised_when_it_is_made_is_that_domains_error(how, install):
     [
         ("stranger:make", "make = 3", "3 is not a function that makes it"),
         ("stranger:make", "make = lambda: 3", "made 3, which is not a Domain"),
+        ("stranger:make", "make = lambda: 'x' * 9999", "xxx...xxxxxxxxxxxxx', which is not a"),
         ("stranger:make", SOUND, "calls itself 'sweeping'"),
         ("stranger:make", "", "has no attribute 'make'"),
         ("stranger", "", "is not a function that makes it"),

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -91,7 +92,10 @@ def test_a_launched_ensemble_solves_what_it_is_asked_for(cli, tmp_path, domain, 
 
 
 def test_a_launched_robot_in_mujoco_does_what_it_is_asked_for(cli, tmp_path):
-    """A given goal, and a bag whose states are measured: no world repeats them."""
+    """A given goal, and a bag whose states are measured: no world repeats them.
+
+    The recorder closes its bag with the launch.
+    """
     pytest.importorskip("mujoco")
     patient = tmp_path / "patient.yaml"  # for a loaded machine
     patient.write_text(PATIENT)
@@ -100,7 +104,6 @@ def test_a_launched_robot_in_mujoco_does_what_it_is_asked_for(cli, tmp_path):
     launch += [f"record:={tmp_path / 'bag'}", "patience:=5.0", f"params_file:={patient}"]
     with started(launch, tmp_path / "launch.txt"):
         plan_length = solve()
-        ros2("service", "call", "/slap/close_bag", "std_srvs/srv/Trigger")
     assert plan_length < 30  # the top block is picked up, no more
     assert evaluate_bag(tmp_path / "bag").runs[-1].plan_length == plan_length
     with pytest.raises(InvalidParameterError, match="its states are measured"):
@@ -116,7 +119,6 @@ def test_a_launched_robot_at_a_bench_is_commanded_while_it_moves(cli, tmp_path):
     launch += ["goal:=(Holding cube0)", f"record:={tmp_path / 'bag'}", "patience:=5.0"]
     with started([*launch, f"params_file:={patient}"], tmp_path / "launch.txt"):
         plan_length = solve()
-        ros2("service", "call", "/slap/close_bag", "std_srvs/srv/Trigger")
     assert evaluate_bag(tmp_path / "bag").runs[-1].plan_length == plan_length > 20
 
 
@@ -220,11 +222,17 @@ HALF_MADE_TASK = re.compile(
 )
 
 
+@cache
+def installed_prefix():
+    """Where the package is installed; ``ros2`` takes a second to say it."""
+    return ros2("pkg", "prefix", "slap_ros").strip()
+
+
 @pytest.mark.parametrize("name", EXECUTABLES)
 def test_ctrl_c_is_quiet_from_the_start(network, tmp_path, name):
     options = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
     options += ["-p", "domain:=obstacle_tower"] if name in ("robot_bridge", "mock_robot") else []
-    executable = subprocess.check_output(["ros2", "pkg", "prefix", "slap_ros"], text=True).strip()
+    executable = installed_prefix()
     for delay_s in (0.0, 0.2, 0.4, 0.7, 1.2):
         node = subprocess.Popen(
             [f"{executable}/lib/slap_ros/{name}", "--ros-args", *options],

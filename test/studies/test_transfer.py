@@ -52,6 +52,16 @@ def test_without_the_extra_nothing_is_solved(monkeypatch, tmp_path):
 
 @pytest.mark.slow  # solves a task four times, and plans with shortcuts
 @pytest.mark.timeout(300)
+@pytest.mark.parametrize("name", ["transfer", "camera"])
+def test_a_domain_without_an_arm_is_refused_and_not_counted_as_unsolved(tmp_path, name):
+    if name == "camera":
+        pytest.importorskip("pupil_apriltags")
+    ran = slap("study", name, "obstacle2d", "--output", tmp_path / "out")
+    assert ran.exit_code == ErrorCode.INVALID_PARAMETER, ran.stderr
+    assert "obstacle2d has no Panda" in ran.stderr
+    assert not list(tmp_path.iterdir())
+
+
 def test_every_task_is_solved_in_both_physics(tmp_path):
     done = study(tmp_path)
     assert done.exit_code == 0, done.stderr

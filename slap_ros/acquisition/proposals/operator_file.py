@@ -61,7 +61,7 @@ def read_operators(path: Path, problem: AcquisitionProblem) -> tuple[LiftedOpera
 
 
 def _drafts(text: str, source: str) -> list[OperatorDraft]:
-    if re.match(r"\s*(;[^\n]*\n\s*)*\(\s*define", text):
+    if re.match(r"\s*(;[^\n]*\n\s*)*\(\s*define", text, re.IGNORECASE):
         return [_draft(operator) for operator in parse_domain(text, source).operators]
     if text.lstrip().startswith("{"):
         return list(_from_json(text, source))

@@ -65,7 +65,7 @@ def ground_task(
     conditions = _Conditions(reached)
     goal = conditions.ground(problem.condition, {})
     if goal is None:
-        raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")
+        raise _out_of_reach(problem.condition, conditions)
     without_cost: list[str] = []
     instances = [
         instance
@@ -74,6 +74,17 @@ def ground_task(
     ]
     task = _Assembly(conditions, goal, instances).task(reached.initial, reached.reached)
     return replace(task, without_cost=tuple(without_cost))
+
+
+def _out_of_reach(goal: Condition, conditions: _Conditions) -> UnsolvableError:
+    """The error for a goal that can never hold; names the parts that no operator achieves."""
+    never = [
+        str(part)
+        for part in conjuncts(goal)
+        if isinstance(part, Literal) and conditions.ground(part, {}) is None
+    ]
+    which = f": nothing that can be done achieves {', '.join(never)}" if never else ""
+    return UnsolvableError(f"the goal is out of reach, even if operators deleted nothing{which}")
 
 
 # -- what can be reached --------------------------------------------------------------------------

@@ -97,7 +97,10 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
     listed = _definition_of(kind, read_lists(text, source))
     title = listed.items[1] if len(listed.items) > 1 else None
     if listed.head != "define" or not isinstance(title, ListNode) or title.head != kind:
-        raise MalformedPddlError(f"{listed.position}: expected (define ({kind} NAME) ...)")
+        wanted = f"{listed.position}: expected (define ({kind} NAME) ...)"
+        other = title.head if isinstance(title, ListNode) else ""
+        found = f", found a {other} only" if other in ("domain", "problem") else ""
+        raise MalformedPddlError(f"{wanted}{found}")
     if len(title.items) != 2:
         raise MalformedPddlError(f"{title.position}: expected ({kind} NAME)")
     name = expect_word(title.items[1], f"the name of the {kind}")

@@ -473,7 +473,12 @@ def prepare(options: ImitationOptions, _: Tell) -> PreparedStudy:
             ),
         },
         make,
-        {"library": options.library, "goal": options.goal, "trainings": None},
+        {
+            "library": options.library,
+            "goal": options.goal,
+            "trainings": None,
+            **options.replayed,
+        },
     )
 
 

@@ -18,7 +18,7 @@ from slap_ros.language.cassette import ReplayingClient, open_client, read_casset
 from slap_ros.language.settings import read_settings
 from slap_ros.studies.lg_sail.model_attempts import LanguageModel, ModelsOnly
 from slap_ros.studies.options import RESULTS, Output
-from slap_ros.studies.results import StudyReport
+from slap_ros.studies.results import Data, StudyReport
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +68,12 @@ class LanguageOptions:
                 "result of a study"
             )
         return LanguageModel(ModelsOnly(client), with_recorded(settings, client))
+
+    @property
+    def replayed(self) -> Data:
+        """The option with which the command repeats recorded answers; none where none are."""
+        _, _, path = self.cassette.partition(":")
+        return {"cassette": f"replay:{path}"} if path else {}
 
     def dated(self, report: StudyReport) -> StudyReport:
         """A report with the day of the answers, and the digest of their recording if there is one.

@@ -404,6 +404,7 @@ def prepare_asking(options: PlanningOptions, variants: Sequence[str], given: Dat
     return PreparedStudy(
         settings | options.as_settings(),
         lambda runner: options.dated(study(models, problems, variants, options.attempts, runner)),
+        options.replayed,
     )
 
 

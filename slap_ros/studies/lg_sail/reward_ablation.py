@@ -242,6 +242,7 @@ def prepare(options: RewardOptions, _: Tell) -> PreparedStudy:
     return PreparedStudy(
         settings | options.as_settings(),
         lambda runner: options.dated(study(model, problem, written, shown, options.trials, runner)),
+        options.replayed,
     )
 
 

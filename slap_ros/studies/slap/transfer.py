@@ -220,10 +220,16 @@ def prepare(options: TransferOptions, tell: Tell) -> PreparedStudy:
     """Open domain and library.
 
     Raises:
-        InvalidParameterError: MuJoCo is not installed.
+        InvalidParameterError: MuJoCo is not installed, or the domain has no such robot.
+        OpenLoopOnlyError: The domain's robot is a hand that acts by forces.
     """
     require_mujoco()
-    return ChosenComparison.of(options, tell).ends().prepare(study)
+    # Not above: the registry of studies is imported where there is no physics.
+    from slap_ros.robot.usable_domains import require_robot
+
+    compared = ChosenComparison.of(options, tell).ends()
+    require_robot(compared.domain, compared.domain.task(0).initial_state)
+    return compared.prepare(study)
 
 
 STUDY = Study(

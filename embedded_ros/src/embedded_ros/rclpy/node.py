@@ -120,13 +120,14 @@ class Node:
             "/parameter_events",
             qos_profile_parameter_events,
         )
+        self._parameter_overrides = self._overrides_with(parameter_overrides or ())
         self._parameters = Parameters(
-            self._parameter_overrides(parameter_overrides or ()),
+            self._parameter_overrides,
             self._announce_parameters,
             allow_undeclared_parameters,
         )
         if automatically_declare_parameters_from_overrides:
-            for name, override in self._parameters.overrides.items():
+            for name, override in self._parameter_overrides.items():
                 self.declare_parameter(name, override.value, ignore_override=True)
         self._time_source = TimeSource(self, self._clock)
         if start_parameter_services:
@@ -777,7 +778,7 @@ class Node:
 
         logging.add_sink(self._logger.name, publish)
 
-    def _parameter_overrides(self, given: Sequence[Parameter]) -> dict[str, Parameter]:
+    def _overrides_with(self, given: Sequence[Parameter]) -> dict[str, Parameter]:
         found = {
             name: Parameter(name, value=value)
             for name, value in self._arguments.parameters_of(
