@@ -111,12 +111,18 @@ class ImplicitSearch:
         self._ratio = 0.0  # see _Entry.expected; 0 before a search for plans
         self._proofs, self._turns_of_proofs = count(), 1
         self._turns = count()
+        self._queued = 0  # options
         self._proven = 0
 
     @property
     def _asked(self) -> int:
         """The number of abstract states of which it was asked what is to come."""
         return self._steps_to_come.cache_info().misses
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The numbers of abstract states that it knows of and of options that it has queued."""
+        return self._asked, self._queued
 
     def begin(self, state: State) -> None:
         """Put the start into the queue.
@@ -246,6 +252,7 @@ class ImplicitSearch:
                 f = option.least_steps(vertex.state) + to_come - vertex.minus_g
                 leads = {"abstract": reached, "options": options, "to_come": to_come}
                 self._put_after(vertex, f, option=option, **leads)
+                self._queued += 1
 
     def _roll_out(self, entry: _Entry, option: Option) -> None:
         """Queue where an option leads; where it fails, no plan is through it."""

@@ -136,9 +136,9 @@ class PlanImprovement:
             if not self._take(better):
                 break
             self._prove(0)
-            yield self._result(None)
+            yield self._result(None, *self._proof.size)
         if self._prove(0):
-            yield self._result(None)
+            yield self._result(None, *self._proof.size)
 
     def _around(self, abstract: int) -> Iterator[PlanningResult]:
         """Search near the start, where shortcuts pay most, then near each plan that is better."""

@@ -75,6 +75,11 @@ class PlanProof:
         """
         return self._search.shorter(below, within, rollouts)
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """The numbers of abstract states and of options that the search has seen."""
+        return self._search.size
+
     @cached_property
     def _search(self) -> ImplicitSearch:
         shortcuts = self._shortcuts
