@@ -9,7 +9,14 @@ from slap_ros.core.domain import Domain, Execution, Goal
 from slap_ros.core.domain_factory import DomainFactory, presets
 from slap_ros.core.goals import task_with_goal
 from slap_ros.core.learner_interface import LearnerInterface, Learning, SettingValue
-from slap_ros.core.skill import DemandingSkill, ForeseeingPolicy, GradualSkill, Policy, Skill
+from slap_ros.core.skill import (
+    DemandingSkill,
+    ForeseeingPolicy,
+    GradualSkill,
+    Policy,
+    ProvingSkill,
+    Skill,
+)
 from slap_ros.core.task import UNSAMPLED, Task
 from slap_ros.core.world import MakeVectorWorld, SyncVectorWorld, VectorWorld, World
 
@@ -33,6 +40,7 @@ __all__ = [
     "Learning",
     "MakeVectorWorld",
     "Policy",
+    "ProvingSkill",
     "Primitives",
     "Script",
     "SettingValue",

@@ -109,3 +109,21 @@ class GradualSkill(Skill, Protocol):
             A higher bound, or ``steps`` where the skill may take so many, or cannot start.
         """
         ...
+
+
+@runtime_checkable
+class ProvingSkill(Skill, Protocol):
+    """A skill that knows more of its steps than searches for plans go by.
+
+    What it knows counts in proofs alone, so that plans do not depend on it.
+    """
+
+    def least_steps_in_plans(self, initial: State, follows: bool) -> int:
+        """Environment steps that it takes at least in plans that begin in a state.
+
+        Args:
+            initial: State in which the plans begin.
+            follows: Whether it comes right after another given skill, and does not lead back to
+                the abstract state in which that began; else it may begin in any state.
+        """
+        ...

@@ -65,7 +65,8 @@ class PlanImprovement:
         self._best = None if known is None else known.plan
         self._no_first: PlanningLimitError | None = None  # why FF found no plan
         self._at_least = 0 if known is None else known.at_least  # environment steps of any plan
-        most = effort.abstract_states(len(problem.operators)) // PROOFS
+        self._is_modest = effort.within > 1.0  # content with a plan that is near the shortest
+        most = effort.abstract_states(len(problem.operators)) // (1 if self._is_modest else PROOFS)
         self._proof = PlanProof(problem, shortcuts, state, goal, most)
         self._is_proving = known is None
         self._forget_failures = shortcuts.forget_failures_since_now() if shortcuts else _nothing
@@ -118,10 +119,26 @@ class PlanImprovement:
                 first = self._find_first()
                 self._prove(0)
                 yield self._result(None, first.graph_nodes, first.graph_edges)
+            if self._is_modest and self._best is not None:
+                yield from self._good_enough()
             self._limit = self._model.executed + self._effort.rollouts // NEAR_PLANS
         yield from self._around(abstract)
         if self._best is None:
             self._find_first()
+
+    def _good_enough(self) -> Iterator[PlanningResult]:
+        """Search for plans and proofs in turns, until a plan is good enough."""
+        assert self._best is not None
+        rollouts, within = self._effort.rollouts, self._effort.within
+        rollouts -= rollouts // NEAR_PLANS
+        while True:
+            better = self._proof.shorter(self._best.predicted_steps, within, rollouts)
+            if not self._take(better):
+                break
+            self._prove(0)
+            yield self._result(None, *self._proof.size)
+        if self._prove(0):
+            yield self._result(None, *self._proof.size)
 
     def _around(self, abstract: int) -> Iterator[PlanningResult]:
         """Search near the start, where shortcuts pay most, then near each plan that is better."""

@@ -12,9 +12,11 @@ from dataclasses import replace
 from functools import cached_property, reduce
 from operator import or_
 
+from slap_ros.core import ProvingSkill, Skill
 from slap_ros.planning.implicit_search import ImplicitSearch
 from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.model import CountedModel
+from slap_ros.planning.plan import Plan
 from slap_ros.planning.potential import LeastSteps, alternate
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.shortcut_source import ShortcutSource
@@ -48,7 +50,7 @@ class PlanProof:
 
     def by_landmarks(self) -> int:
         """Environment steps by landmarks of operators and shortcuts alone."""
-        return self._least_steps(self._start) or 0
+        return self._steps_from(self._start, 0) or 0
 
     def by_search(self, rollouts: int, enough: int) -> int:
         """Environment steps by the search, which goes on where it was.
@@ -58,6 +60,25 @@ class PlanProof:
             enough: Environment steps of which no more need be proven.
         """
         return self._search.at_least(rollouts, enough)
+
+    def shorter(self, below: int, within: float, rollouts: int) -> Plan | None:
+        """A plan that the search meets, which then looks for plans and proofs in turns.
+
+        Args:
+            below: Environment steps of the plan that is known.
+            within: How many times as long as the shortest a plan may be.
+            rollouts: See :meth:`by_search`.
+
+        Returns:
+            A plan that is shorter; None where the known one is good enough, or nothing more is
+            found: :meth:`by_search` says what is proven by then.
+        """
+        return self._search.shorter(below, within, rollouts)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The numbers of abstract states and of options that the search has seen."""
+        return self._search.size
 
     @cached_property
     def _search(self) -> ImplicitSearch:
@@ -79,7 +100,17 @@ class PlanProof:
             fewest = self._fewest_options(abstract)
             if fewest is None or options + fewest > self._options:
                 return None
-        return self._least_steps(abstract)
+        return self._steps_from(abstract, options)
+
+    def _steps_from(self, abstract: int, options: int) -> int | None:
+        """Steps of any plan from an abstract state, be it as deep as the graph or not.
+
+        Args:
+            abstract: Abstract state, a mask.
+            options: Number of options before it.
+        """
+        least = self._least_steps(abstract)
+        return least if options or not least else max(1, least - self._saved_by_first)
 
     @cached_property
     def _options(self) -> int | None:
@@ -97,31 +128,66 @@ class PlanProof:
     @cached_property
     def _fewest_options(self) -> LeastSteps:
         """The number of options from an abstract state to the goal at least."""
-        return LeastSteps(
-            self._goal, [replace(one, least_steps=1) for one in self._relaxed_operators]
-        )
+        operators = self._relaxed_operators(follows=False)
+        return LeastSteps(self._goal, [replace(one, least_steps=1) for one in operators])
 
     @cached_property
     def _least_steps(self) -> LeastSteps:
-        """Steps of any plan from an abstract state, by landmarks of operators and shortcuts."""
-        by_shortcuts = () if self._shortcuts is None else self._shortcuts.relaxed()
-        return LeastSteps(self._goal, [*self._relaxed_operators, *by_shortcuts])
+        """Steps of plans from an abstract state, by landmarks of operators and shortcuts.
+
+        Without shortcuts, each operator counts as if it came right after another.
+        """
+        if self._shortcuts is None:
+            return LeastSteps(self._goal, self._relaxed_operators(follows=True))
+        operators = self._relaxed_operators(follows=False)
+        return LeastSteps(self._goal, [*operators, *self._shortcuts.relaxed()])
 
     @cached_property
-    def _relaxed_operators(self) -> list[RelaxedOperator]:
-        """The operators with the least steps of their skills, without what always holds."""
+    def _saved_by_first(self) -> int:
+        """Steps that an operator takes less, at most, where it is the first of a plan."""
+        if self._shortcuts is not None:
+            return 0
+        first, later = (self._relaxed_operators(follows) for follows in (False, True))
+        saved = (b.least_steps - a.least_steps for a, b in zip(first, later, strict=True))
+        return max(saved, default=0)
+
+    def _relaxed_operators(self, follows: bool) -> list[RelaxedOperator]:
+        """The operators with the least steps of their skills, without what always holds.
+
+        Args:
+            follows: Whether each comes right after another; see
+                :meth:`~slap_ros.core.ProvingSkill.least_steps_in_plans`.
+        """
         grounds = [ground for ground, _ in self._problem.operators]
         changing = reduce(or_, (one.add_effects | one.delete_effects for one in grounds), 0)
         always = self._start & ~changing
+        skills = {option.skill.name: option.skill for _, option in self._problem.operators}
+        least = {
+            name: least_steps_in_plans(skill, self._state, follows)
+            for name, skill in skills.items()
+        }
         return [
             RelaxedOperator(
                 ground.preconditions & ~always,
                 ground.add_effects,
-                option.skill.least_steps,
+                least[option.skill.name],
                 ground.delete_effects,
             )
             for ground, option in self._problem.operators
         ]
+
+
+def least_steps_in_plans(skill: Skill, initial: State, follows: bool) -> int:
+    """What any skill takes at least; see :class:`~slap_ros.core.ProvingSkill`.
+
+    Args:
+        skill: Given skill.
+        initial: State in which plans begin.
+        follows: Whether the skill comes right after another.
+    """
+    if isinstance(skill, ProvingSkill):
+        return max(skill.least_steps, skill.least_steps_in_plans(initial, follows))
+    return skill.least_steps
 
 
 def _never(_: int) -> bool:

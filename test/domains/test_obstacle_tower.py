@@ -10,6 +10,7 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower.features import BLOCK, TowerObjectIndex
+from slap_ros.domains.obstacle_tower.skills import stand_apart
 from slap_ros.domains.obstacle_tower.support import MARGINS, SUPPORT, margins, support
 from slap_ros.domains.obstacle_tower.tasks import (
     PaperTowerTasks,
@@ -312,3 +313,20 @@ def test_a_block_that_turned_in_the_hand_is_put_down_flat(turn):
         assert {"On(block1, table)", "GripperEmpty(robot)"} <= atoms(world.state)
         up = rotate(pose_of(world.state, block).quaternion, (0.0, 0.0, 1.0))
         assert sorted(map(abs, up))[2] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_blocks_that_stand_close_let_the_hand_travel_less():
+    apart = TowerArrangement((0.5, 0.0, 0.0), (0.4, 0.2, 0.0), ((0.5, 0.0, 0.0),) * 3)
+    close = replace(apart, distractors=((0.45, 0.25, 0.0),))  # 0.07 m from the target block
+    initial = [one.task().initial_state for one in (apart, close)]
+    assert [stand_apart(state) for state in initial] == [True, False]
+    for name, skill in FAIR.skills.items():
+        least = [skill.least_steps_in_plans(state, follows=True) for state in initial]
+        assert least[0] == least[1] + 1
+        assert least[1] == skill.least_steps_in_plans(initial[0], follows=False), name
+
+
+def test_random_tasks_let_the_hand_travel():
+    for preset in ("fair", "fair:obstacles=8", "fair:distractors=5", "fair:towers=3"):
+        domain = get_domain("obstacle_tower", preset)
+        assert all(stand_apart(domain.task(seed).initial_state) for seed in range(10))

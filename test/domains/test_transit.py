@@ -5,9 +5,11 @@
 import pytest
 
 from benchmarks.physics_step import with_joints
+from benchmarks.travel import GOALS, measure
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower.skills import PLANNING_SCENE
 from slap_ros.domains.tabletop.grasps import from_above
+from slap_ros.domains.tabletop.skills import APPROACH_STEPS, TRAVEL_STEPS
 from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.transit import CLEARANCE, LOWER, Transit
 from slap_ros.motion import nearest_configurations
@@ -72,3 +74,10 @@ def test_the_hand_rises_less_where_something_is_in_the_way_further_up():
 
 def named(obj, names, values):
     return {(obj, name): value for name, value in zip(names, values, strict=True)}
+
+
+def test_an_arm_takes_more_steps_to_another_place_than_proofs_count_on():
+    """The fastest of all configurations and starts; whole steps make three of more than two."""
+    least = measure(24, GOALS[::7])
+    assert least["approach"] > APPROACH_STEPS - 1
+    assert least["travel"] > TRAVEL_STEPS - 1

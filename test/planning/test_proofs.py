@@ -12,15 +12,19 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError
 from slap_ros.planning import anytime
 from slap_ros.planning.anytime import AnytimePlanner
+from slap_ros.planning.effort import Effort
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
 from slap_ros.planning.options import Option, OptionKind
+from slap_ros.planning.plan_proof import PlanProof, least_steps_in_plans
 from slap_ros.planning.potential import LeastSteps, alternate
 from slap_ros.planning.problem import Problem
+from slap_ros.planning.search import build_bottom_level
 from slap_ros.relational import GroundOperator, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
 from support.cheapest_plans import cheapest
+from support.marks import slow
 from test.planning.test_anytime_made_up import LIFTED, WORLD, MadeUpModel, Skill, made_up, plan
 
 NOT_ALTERNATING = (
@@ -146,6 +150,38 @@ def test_a_graph_with_ways_that_are_longer_than_it_is_deep_limits_no_depth(seed,
     assert found.at_least <= lazy.steps
 
 
+@pytest.mark.parametrize("within", [1.1, 1.5, 3.0])
+def test_what_is_said_to_be_good_enough_is(within, too_large):
+    """The search for plans and proofs in turns, against the shortest plan of the whole graph."""
+    good_enough, by_search = 0, 0
+    for seed in range(300):
+        problem, start, goal = made_up_hand(seed)
+        lazy = plan(GraphPlanner(problem), start, goal)
+        usual = plan(AnytimePlanner(made_up_hand(seed)[0]), start, goal)
+        effort = Effort(rollouts=100, within=within)
+        found = plan(AnytimePlanner(made_up_hand(seed)[0], effort=effort), start, goal)
+        if lazy is None or found is None:
+            continue
+        assert found.at_least <= lazy.steps
+        if found.bound is not None and found.bound <= within:
+            assert found.steps <= within * lazy.steps
+            good_enough += 1
+        assert executed(problem, found.plan, start) == found.steps
+        by_search += found.plan != usual.plan
+    assert good_enough > 100
+    assert by_search > 10
+
+
+def executed(problem, made, state):
+    """The steps of a plan that reaches all of its targets; else the test fails."""
+    steps = 0
+    for edge in made.edges:
+        rollout = problem.model.roll_out(edge.option, state, edge.target)
+        assert rollout.reached
+        state, steps = rollout.final, steps + rollout.steps
+    return steps
+
+
 @pytest.mark.parametrize("seed", [300, 301])
 @pytest.mark.parametrize("shortcuts", [False, True])
 def test_towers_are_never_proven_to_take_longer_than_they_do(seed, shortcuts, too_large):
@@ -174,3 +210,78 @@ def test_shortcuts_begin_where_they_may(name):
     begin |= {edge.source for edge in known.beyond(graph, ())}
     assert begin
     assert all(known.may_begin(graph.nodes[i]) for i in begin)
+
+
+def tower(seed, preset):
+    """A domain, the initial state of a task, its problem and the mask of its goal."""
+    domain = get_domain("obstacle_tower", preset)
+    task = domain.task(seed)
+    problem = Problem.of(domain, task.initial_state)
+    return task.initial_state, problem, problem.model.space.mask(task.goal)
+
+
+@pytest.mark.parametrize(
+    ("preset", "seed"), [("fair:obstacles=2,distractors=1", 300), *slow(("fair", 2))]
+)
+def test_no_rest_of_a_plan_is_said_to_take_longer_than_the_shortest(preset, seed):
+    """Exhaustively, from each state in which any path of the graph ends or passes."""
+    state, problem, goal = tower(seed, preset)
+    graph = GraphPlanner(problem).graph(problem.model.space.abstract(state), goal)
+    bottom = build_bottom_level(graph, state, problem.model)
+    proof = PlanProof(problem, None, state, goal, 10**6)
+    proof.first_options = graph.depth[graph.goal_nodes[0]]
+    to_go, checked, share = {}, 0, 0.0
+    for key, found in reversed(bottom.successors.items()):  # nodes in order, backwards
+        rests = [
+            steps + to_go.get(after.key, 0)
+            for _, steps, after in found
+            if leads(after, to_go, graph)
+        ]
+        if not rests:
+            continue
+        to_go[key], node = min(rests), key[0]
+        least = proof._steps_to_come(graph.nodes[node], graph.depth[node])
+        assert least is not None
+        assert least <= to_go[key]
+        checked, share = checked + 1, share + least / to_go[key]
+    assert checked > 10
+    assert share / checked > 0.25
+
+
+def leads(vertex, to_go, graph):
+    """Whether a way to the goal is known from a vertex."""
+    return vertex.node in graph.goal_nodes or vertex.key in to_go
+
+
+@pytest.mark.parametrize(
+    ("preset", "seed"), [("fair:obstacles=6", 301), ("fair:distractors=5", 302)]
+)
+def test_given_skills_take_as_long_as_proofs_say(preset, seed):
+    """All that can be done along a plan, but what leads back, rolled out."""
+    initial, problem, goal = tower(seed, preset)
+    model, state, before = problem.model, initial, None
+    followed = []
+    for edge in AnytimePlanner(problem, effort=Effort(rollouts=1)).plan(initial, goal).plan.edges:
+        abstract = model.space.abstract(state)
+        for ground, option in problem.operators:
+            target = option.target(ground.apply(abstract))
+            if not ground.applicable(abstract) or ground.apply(abstract) == before:
+                continue
+            rollout = model.roll_out(option, state, target)
+            if rollout.reached:
+                least = least_steps_in_plans(option.skill, initial, before is not None)
+                assert option.skill.least_steps < least <= rollout.steps
+                followed += [rollout.steps - least] if before is not None else []
+        state, before = model.roll_out(edge.option, state, edge.target).final, abstract
+    assert len(followed) > 50
+    assert min(followed) <= 4
+
+
+def test_a_tower_of_eight_is_planned_for_until_a_plan_is_good_enough():
+    state, problem, goal = tower(303, "fair:obstacles=8")
+    usual = AnytimePlanner(problem, effort=Effort(rollouts=40)).plan(state, goal)
+    state, problem, goal = tower(303, "fair:obstacles=8")
+    found = AnytimePlanner(problem, effort=Effort(within=1.25)).plan(state, goal)
+    assert found.bound <= 1.25 < usual.bound
+    assert problem.model.executed <= 250
+    assert executed(problem, found.plan, state) == found.steps < usual.steps

@@ -8,7 +8,10 @@ with the fingers still around a block that was let go, or a block just lifted of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from functools import partial
+from itertools import combinations
 
 from slap_ros.core import Skill
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
@@ -22,7 +25,7 @@ from slap_ros.domains.tabletop.grasps import (
 from slap_ros.domains.tabletop.memory import memoized
 from slap_ros.domains.tabletop.placements import GAP, Placement, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
-from slap_ros.domains.tabletop.skills import GRIP, RELEASE, TransitSkill
+from slap_ros.domains.tabletop.skills import GRIP, RELEASE, TRAVEL, TransitSkill
 from slap_ros.domains.tabletop.state_access import box_of, held_body, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.transit import Transit
@@ -34,6 +37,7 @@ from slap_ros.worlds.features import pose_of
 
 LIFT = 0.02  # m, of a block that counts as picked; the fingers go as far in a control step
 TABLE_MARGIN = 0.05  # m, of places on the table from its edges
+ONE_OVER_ANOTHER = GAP - TRAVEL  # m, between middles seen from above, at most
 
 
 def _solid(state: State) -> Iterator[tuple[Object, OrientedBox]]:
@@ -108,13 +112,30 @@ def _places(state: State, block: Object, table: Object) -> list[Placement]:
     return free_placements(near, middle, margins, taken)
 
 
+@memoized
+def stand_apart(state: State) -> bool:
+    """Whether blocks and targets stand one over another, or so far apart that the hand travels.
+
+    Places on the table are GAP away from all that stands there. So a hand that picks up another
+    block than it has put down, or puts one down elsewhere, goes TRAVEL at least.
+    """
+    held = held_body(state)
+    things = [b for b in state.layout.of_type(BLOCK) if b != held]
+    things += [s for s in state.layout.of_type(SURFACE) if state.get(s, "is_target") > 0.5]
+    places = [pose_of(state, thing).position[:2] for thing in things]
+    distances = (math.dist(*pair) for pair in combinations(places, 2))
+    return all(one <= ONE_OVER_ANOTHER or one >= TRAVEL for one in distances)
+
+
 def skills(timing: Timing) -> dict[str, Skill]:
     """A skill for each operator."""
+    pick = partial(TransitSkill, timing=timing, gripper=GRIP, lift=LIFT, travels=stand_apart)
+    place = partial(TransitSkill, timing=timing, gripper=RELEASE, travels=stand_apart)
     return {
-        "Pick": TransitSkill("Pick", timing, _to_block, GRIP, LIFT),
-        "PickFromTarget": TransitSkill("PickFromTarget", timing, _to_block, GRIP, LIFT),
-        "Unstack": TransitSkill("Unstack", timing, _to_block, GRIP, LIFT),
-        "Place": TransitSkill("Place", timing, _onto_table, RELEASE),
-        "PlaceInTarget": TransitSkill("PlaceInTarget", timing, _onto_middle, RELEASE),
-        "Stack": TransitSkill("Stack", timing, _onto_middle, RELEASE),
+        "Pick": pick("Pick", transits=_to_block),
+        "PickFromTarget": pick("PickFromTarget", transits=_to_block),
+        "Unstack": pick("Unstack", transits=_to_block),
+        "Place": place("Place", transits=_onto_table),
+        "PlaceInTarget": place("PlaceInTarget", transits=_onto_middle),
+        "Stack": place("Stack", transits=_onto_middle),
     }

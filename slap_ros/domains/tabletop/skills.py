@@ -30,6 +30,16 @@ LAG = 0.005  # rad, by which an arm may be late without being waited for
 TRIES = 3  # for a position
 AIM = 0.009  # m, between the fingers' middle and that of what they close around
 AIM_STEPS = 40  # environment steps, at most, to bring the fingers there
+# Steps of the arm's fastest way to a goal, counted in whole ones. Coming down on it by CLEARANCE
+# takes 1.05 or more, and together with the way to over it, from where the hand pointed down TRAVEL
+# away, 2.05 or more: the least of all configurations (python -m benchmarks.travel).
+APPROACH_STEPS, TRAVEL_STEPS = 2, 3
+TRAVEL = 0.09  # m
+
+
+def _nowhere(_: State) -> bool:
+    return False
+
 
 # The transits of a skill from a state, in the order in which they are tried.
 Transits = Callable[[State, tuple[Object, ...]], Iterable[Transit]]
@@ -147,6 +157,9 @@ class TransitSkill:
         transits: Function that gives the transits to try; see :data:`Transits`.
         gripper: The gripper command at the goal; it grips the second of the skill's objects.
         lift: Height to which the hand is lifted after the gripper command, m.
+        travels: Function that says of a state whether, in plans that begin in it, the hand goes to
+            another place than where it was left, at least TRAVEL away, unless the skill undoes what
+            the one before did.
         step_limit: Environment steps after which the skill fails.
     """
 
@@ -155,6 +168,7 @@ class TransitSkill:
     transits: Transits
     gripper: float
     lift: float = 0.0
+    travels: Callable[[State], bool] = _nowhere
     step_limit: int = STEP_LIMIT
 
     @property
@@ -167,6 +181,11 @@ class TransitSkill:
         least = _least_steps(self, state, objects)
         # Without a transit there is no roll-out, so that any bound is admissible.
         return self.step_limit if math.isinf(least) else int(least) + self._after
+
+    def least_steps_in_plans(self, initial: State, follows: bool) -> int:
+        """See :class:`~slap_ros.core.ProvingSkill`."""
+        is_far = follows and self.travels(initial)
+        return (TRAVEL_STEPS if is_far else APPROACH_STEPS) + self._after
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Plan the motion.
