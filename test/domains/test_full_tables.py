@@ -151,6 +151,13 @@ def test_a_range_of_towers_gives_tasks_of_each_number():
     assert counts == {1, 2, 3}
 
 
+def test_eight_distractors_have_room_in_every_task():
+    """Where those that are drawn first leave none, all are drawn again."""
+    domain = get_domain("obstacle_tower", "fair:distractors=8")
+    for seed in range(10):
+        assert len(domain.task(seed).initial_state.layout.of_type(BLOCK)) == 3 + 1 + 8
+
+
 def test_where_towers_have_no_room_it_is_said():
     domain = get_domain("obstacle_tower", "fair:towers=3,block_y=-0.1..0.1")
     with pytest.raises(InvalidParameterError, match=r"no room for \d towers"):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
@@ -30,7 +31,8 @@ STEP_LIMIT = 500  # environment steps for each tower (SLAP, appendix)
 APART = 1.4 * GAP  # between a block that stands about and a tower or another block, at least
 NEARER = 1.1 * GAP  # between such blocks on a table with several towers
 BETWEEN_TOWERS = 0.2  # between the middles of targets at least
-TRIES = 10_000  # places drawn before there is said to be no room
+TRIES = 10_000  # places drawn for one thing
+ARRANGEMENTS = 20  # drawn before there is said to be no room
 PLATE_HALF = (0.026, 0.026, 0.0005)  # the target: a plate for one block, flush with the table
 
 Range = tuple[float, float]
@@ -161,6 +163,17 @@ class RandomTowerTasks(ArmSettings):
 
         Raises:
             InvalidParameterError: There is no room for so many towers or distractors.
+        """
+        for _ in range(ARRANGEMENTS - 1):
+            with suppress(InvalidParameterError):
+                return self._arranged(rng)
+        return self._arranged(rng)
+
+    def _arranged(self, rng: np.random.Generator) -> Task:
+        """The same, where what is drawn first leaves room for all that comes then.
+
+        Raises:
+            InvalidParameterError: It leaves none.
         """
         further = int(rng.integers(self.towers[0], self.towers[1] + 1)) - 1
         obstacles = int(rng.integers(self.obstacles[0], self.obstacles[1] + 1))
