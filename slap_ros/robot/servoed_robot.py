@@ -7,12 +7,15 @@ joints give the hand's velocity. Things that are detected in one place are at re
 move as their last detections do, and so does what slides or turns of a drawer or a lid, which says
 how far that is open. What is between fingers that were told to close and stand is held:
 it goes with the hand, for detections are older than encoders. And what was told is known.
+
+A camera does not see what the arm hides: that is where it was seen last, or where it was let go.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -24,8 +27,10 @@ from slap_ros.errors import (
     InvalidStateError,
     NoJointStateError,
 )
-from slap_ros.geometry.pose import Pose, cross
+from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.relational import Object, State
+from slap_ros.robot.bench_supports import put_down
+from slap_ros.robot.carried_body import CarriedBody, is_between
 from slap_ros.robot.detected_objects import DetectedObjects
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import Joints, Workspace
@@ -33,17 +38,16 @@ from slap_ros.robot.opening_sensor import OpeningSensor
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.servoing import HandServo, ServoCommand, moving_hand
 from slap_ros.robot.state_assembly import possible_joints
-from slap_ros.robot.tracking import Track, TrackingSettings
+from slap_ros.robot.tracking import Detection, PoseEstimate, Track, TrackingSettings, still
 from slap_ros.worlds.contact.command import HandCommand
 from slap_ros.worlds.contact.features import ROBOT
-from slap_ros.worlds.contact.hand import PAD, HandState
+from slap_ros.worlds.contact.hand import HandState
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot, Opening
-from slap_ros.worlds.contact.validation import GRASP_GAP, require_possible_bodies
+from slap_ros.worlds.contact.validation import require_possible_bodies
 from slap_ros.worlds.contact.world import ContactWorld
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN, grasp_pose
-from slap_ros.worlds.validation import share_space
 
 REMEMBERED = 256  # joint readings, for where the hand was when something was detected
 STANDING = 0.005  # m/s, of each finger: slower ones press, or are at their end
@@ -104,6 +108,11 @@ def _require_detected(scene: ContactScene, scene_config: SceneConfig) -> None:
         raise InvalidSceneError(f"{name} does not move: it needs a pose, and not a frame")
 
 
+def stands(hand: HandState) -> bool:
+    """Whether fingers press, or are at their end."""
+    return max(map(abs, hand.finger_velocities)) <= STANDING
+
+
 class ServoedRobot:
     """A robot and the objects at its bench.
 
@@ -139,7 +148,10 @@ class ServoedRobot:
             self._object(body.name): OpeningSensor(body, pose)
             for body, pose in zip(scene.jointed, self._placement.jointed, strict=True)
         }
-        self._detected = DetectedObjects(scene_config, tracking, lambda _: None, self._openings)
+        self._tracking = tracking
+        self._detected = DetectedObjects(scene_config, tracking, self._in_hand, self._openings)
+        self._carried: CarriedBody | None = None
+        self._let_go: dict[Object, Detection] = {}  # where and when the hand let go of what it had
         self._readings: deque[JointReading] = deque(maxlen=REMEMBERED)
         self._servo: HandServo | None = None
         self._state: State | None = None  # measured last
@@ -162,7 +174,12 @@ class ServoedRobot:
         self._detected.add(frame, stamp_s * self._pace, base, seen)
 
     def add_picture(self, stamp_s: float) -> None:
-        """Ignore that a picture was searched: what is not detected is not known."""
+        """Take that a picture was searched: what none of several shows is hidden.
+
+        Args:
+            stamp_s: Time at which it was taken, s.
+        """
+        self._detected.add_picture(stamp_s * self._pace)
 
     def add_joint_reading(self, reading: JointReading) -> None:
         """Take joint positions.
@@ -186,14 +203,24 @@ class ServoedRobot:
         return bool(self._readings) and not self._readings[-1].at_rest
 
     def undetected(self, since_s: float) -> list[str]:
-        """Names of the objects that were not detected since a time, s.
+        """Names of the objects that were not detected since a time, s, without those hidden since.
 
         Where detections of one come and are refused, its name is followed by the reason.
         """
         detected = self._detected
-        unseen = [o for o, t in detected.tracks.items() if t.newest_s <= since_s * self._pace]
+        unseen = [
+            obj
+            for obj, track in detected.tracks.items()
+            if track.newest_s <= since_s * self._pace
+            and not (track.newest_s > -math.inf and self._is_hidden(obj))
+        ]
         refused = detected.refusals
         return [f"{o.name} ({refused[o]})" if o in refused else o.name for o in unseen]
+
+    @property
+    def hidden(self) -> list[str]:
+        """Names of the objects that the last pictures do not show."""
+        return [obj.name for obj in self._detected.tracks if self._is_hidden(obj)]
 
     # -- states ---------------------------------------------------------------------------------
 
@@ -238,12 +265,12 @@ class ServoedRobot:
         if self.newest_joints_s <= since_s or len(self._readings) < 2:
             return None
         hand, joints = self._hand(told)
-        bodies, openings = self._bodies(), self._measured_openings()
+        self._follow_carried(hand)
+        bodies, openings = self._bodies(hand), self._measured_openings()
         if bodies is None or openings is None:
             return None
-        held = self._held(hand)
-        if held is not None:
-            bodies = (*bodies[:held], self._carried(held, hand), *bodies[held + 1 :])
+        bodies = put_down(self._model.scene, self._placement, bodies, openings, self._eyes(bodies))
+        held = self._carried.index if self._carried is not None and stands(hand) else None
         snapshot = ContactSnapshot(joints, hand, bodies, openings, held)
         state = self._index.write(self._template, snapshot)
         state.require_finite()
@@ -270,45 +297,96 @@ class ServoedRobot:
         before = [one for one in list(self._readings)[:-1] if one.stamp_s <= stamp_s]
         return before[-1] if before else self._readings[0]
 
-    def _bodies(self) -> tuple[BodyState, ...] | None:
+    def _bodies(self, hand: HandState) -> tuple[BodyState, ...] | None:
         """How bodies lie or move; None as long as one was not detected often enough."""
-        tracks = [self._track(body.name) for body in self._model.scene.free]
-        found = [motion for track in tracks if (motion := track.newest_motion()) is not None]
-        if len(found) < len(tracks):
-            return None
-        return tuple(BodyState(one.pose, one.velocity, one.spin) for one in found)
+        found = []
+        for i, body in enumerate(self._model.scene.free):
+            if self._carried is not None and self._carried.index == i:
+                found.append(self._carried.motion(hand))
+                continue
+            motion = self._motion(self._object(body.name))
+            if motion is None:
+                return None
+            found.append(BodyState(motion.pose, motion.velocity, motion.spin))
+        return tuple(found)
+
+    def _eyes(self, bodies: Sequence[BodyState]) -> dict[int, Vector]:
+        """Where the camera is that saw a body at rest, by the body's index."""
+        names = [body.name for body in self._model.scene.free]
+        eyes = {i: self._track(name).newest.eye for i, name in enumerate(names) if bodies[i].still}
+        carried = None if self._carried is None else self._carried.index
+        return {i: eye for i, eye in eyes.items() if eye is not None and i != carried}
 
     def _measured_openings(self) -> tuple[Opening, ...] | None:
         """How far drawers and lids are open; None as long as one was not detected often enough."""
         found = []
         for obj, sensor in self._openings.items():
-            motion = self._detected.tracks[obj].newest_motion()
+            motion = self._motion(obj)
             if motion is None:
                 return None
             found.append(sensor.opening(motion))
         return tuple(found)
 
-    def _held(self, hand: HandState) -> int | None:
-        """Index of the body that fingers stand around which were told to close."""
-        if not hand.closing or max(map(abs, hand.finger_velocities)) > STANDING:
+    def _motion(self, obj: Object) -> PoseEstimate | None:
+        """What is known of an object that the hand does not carry; None where that is too little.
+
+        What is hidden is at rest where it was seen last, or was let go.
+        """
+        track, let_go = self._detected.tracks[obj], self._let_go.get(obj)
+        motion = track.newest_motion(-math.inf if let_go is None else let_go.stamp_s)
+        if motion is None and let_go is not None:
+            last = track.newest if track.newest_s > let_go.stamp_s else let_go
+            return still(last.pose, 1, last.eye)
+        if motion is None:
             return None
-        pads = [box.grown(GRASP_GAP) for box in hand.boxes() if box.half == PAD.half_extents_m]
+        if self._is_hidden(obj):
+            return still(motion.pose, motion.weight, motion.eye)
+        if motion.at_rest and motion.eye is not None:
+            track.remember(motion)
+        return motion
+
+    def _is_hidden(self, obj: Object) -> bool:
+        return self._detected.is_hidden(obj, -math.inf, self._tracking.hidden_after)
+
+    def _follow_carried(self, hand: HandState) -> None:
+        """Find out what goes with the hand from now on, and where in it that is."""
+        if self._carried is None:
+            if hand.closing and stands(hand):
+                self._carried = self._grasped(hand)
+            return
+        body = self._model.scene.free[self._carried.index]
+        newest = self._track(body.name).newest
+        if newest.stamp_s > self._carried.seen_s:
+            then = grasp_pose(self._reading_at(newest.stamp_s).joints)
+            self._carried = self._carried.seen(newest, then)
+        pose = hand.pose.compose(self._carried.pose)
+        if not (hand.closing and is_between(hand, body.parts, pose)):
+            stamp_s = max(self._readings[-1].stamp_s, newest.stamp_s)
+            if newest.eye is not None:
+                self._let_go[self._object(body.name)] = Detection(stamp_s, pose, eye=newest.eye)
+            self._carried = None
+
+    def _grasped(self, hand: HandState) -> CarriedBody | None:
+        """The body that is between the fingers: where it was detected, or gone with them since."""
+        now_s = self._readings[-1].stamp_s
         for i, body in enumerate(self._model.scene.free):
-            pose = self._carried(i, hand).pose
-            parts = [part.bounding_box.at(pose) for part in body.parts]
-            if all(share_space([pad], parts) for pad in pads):
-                return i
+            motion = self._motion(self._object(body.name))
+            if motion is None:
+                continue
+            seen_s = self._track(body.name).newest_s
+            then = grasp_pose(self._reading_at(seen_s).joints)
+            for at in (hand.pose, then):
+                in_hand = at.inverse().compose(motion.pose)
+                if is_between(hand, body.parts, hand.pose.compose(in_hand)):
+                    return CarriedBody(i, in_hand, now_s, seen_s)
         return None
 
-    def _carried(self, index: int, hand: HandState) -> BodyState:
-        """A body that has gone with the hand since it was detected."""
-        seen = self._track(self._model.scene.free[index].name).newest
-        then = grasp_pose(self._reading_at(seen.stamp_s).joints)
-        pose = hand.pose.compose(then.inverse().compose(seen.pose))
-        (x, y, z), (px, py, pz) = hand.pose.position, pose.position
-        turned = cross(hand.angular_velocity, (px - x, py - y, pz - z))
-        vx, vy, vz = (a + b for a, b in zip(hand.velocity, turned, strict=True))
-        return BodyState(pose, (vx, vy, vz), hand.angular_velocity)
+    def _in_hand(self, obj: Object) -> Pose | None:
+        """Where the hand has an object; None where it does not carry it."""
+        carried = self._carried
+        if carried is None or self._object(self._model.scene.free[carried.index].name) != obj:
+            return None
+        return grasp_pose(self._readings[-1].joints).compose(carried.pose)
 
     def _track(self, name: str) -> Track:
         return self._detected.tracks[self._object(name)]

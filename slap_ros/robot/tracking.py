@@ -124,12 +124,23 @@ class Track:
         """The newest detection; there must be one."""
         return self._detections[-1]
 
-    def newest_motion(self) -> PoseEstimate | None:
-        """The pose and its motion from the last detections alone; None if they are too few."""
-        few = list(self._detections)[-self._settings.confirmations :]
+    def newest_motion(self, since_s: float = -math.inf) -> PoseEstimate | None:
+        """The pose and its motion from the last detections; None if they are too few since then.
+
+        They are all there is to know, unless an earlier pose at rest was remembered and explains
+        them as well.
+
+        Args:
+            since_s: Time before which detections do not count, s.
+        """
+        few = [d for d in self._detections if d.stamp_s > since_s][-self._settings.confirmations :]
         if len(few) < self._settings.confirmations:
             return None
-        return _standing(few) if self._agree(few) else _moving(few)
+        if not self._agree(few):
+            return _moving(few)
+        if self._known is not None and self._explains(self._known, few):
+            return self._merged(self._known, few)
+        return _standing(few)
 
     def estimate(self, since_s: float) -> PoseEstimate | None:
         """The pose and its motion from detections since then; None if they are too few."""
