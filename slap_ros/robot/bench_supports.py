@@ -12,6 +12,9 @@ from slap_ros.worlds.contact.scene import ContactScene, Part
 from slap_ros.worlds.contact.snapshot import Opening, Placement
 from slap_ros.worlds.joint_space.settling import resting_poses
 from slap_ros.worlds.layout_index import BodyState
+from slap_ros.worlds.settling import levelled
+
+PRESSED = 0.005  # m, by which what is carried may seem to be inside what it is put down on
 
 
 def put_down(
@@ -34,6 +37,43 @@ def put_down(
     fixed = list(_supports(scene, placement, openings))
     found = resting_poses(measured, scene.free, fixed, eyes)
     return tuple(one._replace(pose=found.get(i, one.pose)) for i, one in enumerate(bodies))
+
+
+def lifted_out(
+    scene: ContactScene,
+    placement: Placement,
+    bodies: Sequence[BodyState],
+    openings: Sequence[Opening],
+    carried: int,
+) -> Pose:
+    """The pose of a carried body, raised out of what it is put down on.
+
+    A hand that goes on down while its fingers close, or while it presses on a support, has the body
+    higher up than before; and a camera does not say how far away the body is.
+
+    Args:
+        scene: Bodies of the scene.
+        placement: Poses of the bodies that do not move.
+        bodies: How the free bodies lie or move.
+        openings: How far drawers and lids are open.
+        carried: Index of the body.
+    """
+    pose, below = bodies[carried].pose, list(_supports(scene, placement, openings))
+    for i, one in enumerate(bodies):
+        if i != carried and one.still:
+            below += _boxes(scene.free[i].parts, one.pose)
+    box = scene.free[carried].at(levelled(pose) or pose)
+    inside = (other.top - box.bottom for other in below if _is_over(box, other))
+    rise = max((one for one in inside if 0.0 < one <= PRESSED), default=0.0)
+    x, y, z = pose.position
+    return Pose((x, y, z + rise), pose.quaternion)
+
+
+def _is_over(box: OrientedBox, other: OrientedBox) -> bool:
+    """Whether a box's middle is over another box."""
+    x, y, _ = box.pose.position
+    there = other.pose.inverse().apply((x, y, other.pose.position[2]))
+    return all(abs(a) <= half for a, half in zip(there, other.half, strict=True))
 
 
 def _supports(

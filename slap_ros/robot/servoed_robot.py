@@ -29,7 +29,7 @@ from slap_ros.errors import (
 )
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.relational import Object, State
-from slap_ros.robot.bench_supports import put_down
+from slap_ros.robot.bench_supports import lifted_out, put_down
 from slap_ros.robot.carried_body import CarriedBody, is_between
 from slap_ros.robot.detected_objects import DetectedObjects
 from slap_ros.robot.joint_reading import JointReading
@@ -151,7 +151,8 @@ class ServoedRobot:
         self._tracking = tracking
         self._detected = DetectedObjects(scene_config, tracking, self._in_hand, self._openings)
         self._carried: CarriedBody | None = None
-        self._let_go: dict[Object, Detection] = {}  # where and when the hand let go of what it had
+        self._lying: dict[int, Pose] = {}  # on what supports them, of bodies that a camera saw last
+        self._let_go: dict[Object, Detection] = {}  # where and when the hand had something last
         self._readings: deque[JointReading] = deque(maxlen=REMEMBERED)
         self._servo: HandServo | None = None
         self._state: State | None = None  # measured last
@@ -269,7 +270,10 @@ class ServoedRobot:
         bodies, openings = self._bodies(hand), self._measured_openings()
         if bodies is None or openings is None:
             return None
-        bodies = put_down(self._model.scene, self._placement, bodies, openings, self._eyes(bodies))
+        eyes = self._eyes(bodies)
+        bodies = put_down(self._model.scene, self._placement, bodies, openings, eyes)
+        self._lying = {i: bodies[i].pose for i in eyes}
+        bodies = self._off_support(hand, bodies, openings)
         held = self._carried.index if self._carried is not None and stands(hand) else None
         snapshot = ContactSnapshot(joints, hand, bodies, openings, held)
         state = self._index.write(self._template, snapshot)
@@ -317,6 +321,25 @@ class ServoedRobot:
         carried = None if self._carried is None else self._carried.index
         return {i: eye for i, eye in eyes.items() if eye is not None and i != carried}
 
+    def _off_support(
+        self, hand: HandState, bodies: tuple[BodyState, ...], openings: Sequence[Opening]
+    ) -> tuple[BodyState, ...]:
+        """The bodies, with a carried one that a camera sees raised out of what it is put down on.
+
+        Args:
+            hand: The hand now.
+            bodies: How the bodies lie or move.
+            openings: How far drawers and lids are open.
+        """
+        if self._carried is None:
+            return bodies
+        i = self._carried.index
+        if self._track(self._model.scene.free[i].name).newest.eye is None:
+            return bodies
+        pose = lifted_out(self._model.scene, self._placement, bodies, openings, i)
+        self._carried = replace(self._carried, pose=hand.pose.inverse().compose(pose))
+        return (*bodies[:i], bodies[i]._replace(pose=pose), *bodies[i + 1 :])
+
     def _measured_openings(self) -> tuple[Opening, ...] | None:
         """How far drawers and lids are open; None as long as one was not detected often enough."""
         found = []
@@ -361,10 +384,10 @@ class ServoedRobot:
             self._carried = self._carried.seen(newest, then)
         pose = hand.pose.compose(self._carried.pose)
         if not (hand.closing and is_between(hand, body.parts, pose)):
-            stamp_s = max(self._readings[-1].stamp_s, newest.stamp_s)
-            if newest.eye is not None:
-                self._let_go[self._object(body.name)] = Detection(stamp_s, pose, eye=newest.eye)
             self._carried = None
+        elif newest.eye is not None:
+            now_s = self._readings[-1].stamp_s
+            self._let_go[self._object(body.name)] = Detection(now_s, pose, eye=newest.eye)
 
     def _grasped(self, hand: HandState) -> CarriedBody | None:
         """The body that is between the fingers: where it was detected, or gone with them since."""
@@ -375,8 +398,9 @@ class ServoedRobot:
                 continue
             seen_s = self._track(body.name).newest_s
             then = grasp_pose(self._reading_at(seen_s).joints)
-            for at in (hand.pose, then):
-                in_hand = at.inverse().compose(motion.pose)
+            lay = self._lying.get(i, motion.pose)
+            for at, pose in ((hand.pose, lay), (then, motion.pose)):
+                in_hand = at.inverse().compose(pose)
                 if is_between(hand, body.parts, hand.pose.compose(in_hand)):
                     return CarriedBody(i, in_hand, now_s, seen_s)
         return None
