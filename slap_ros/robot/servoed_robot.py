@@ -356,7 +356,10 @@ class ServoedRobot:
         What is hidden is at rest where it was seen last, or was let go.
         """
         track, let_go = self._detected.tracks[obj], self._let_go.get(obj)
-        motion = track.newest_motion(-math.inf if let_go is None else let_go.stamp_s)
+        since_s = -math.inf if let_go is None else let_go.stamp_s
+        motion, lying = track.newest_motion(since_s), self._lying_since(obj, since_s)
+        if lying is not None and self._is_hidden(obj):
+            return lying
         if motion is None and let_go is not None:
             last = track.newest if track.newest_s > let_go.stamp_s else let_go
             return still(last.pose, 1, last.eye)
@@ -364,9 +367,22 @@ class ServoedRobot:
             return None
         if self._is_hidden(obj):
             return still(motion.pose, motion.weight, motion.eye)
-        if motion.at_rest and motion.eye is not None:
-            track.remember(motion)
         return motion
+
+    def _lying_since(self, obj: Object, since_s: float) -> PoseEstimate | None:
+        """Where a thing lies that a camera has seen there often; None where it may be elsewhere.
+
+        Args:
+            obj: Object that is detected.
+            since_s: Time at which the hand let go of it, s.
+        """
+        track = self._detected.tracks[obj]
+        if obj in self._openings or track.newest_s <= since_s:
+            return None
+        sure = track.estimate(since_s)
+        if sure is not None and sure.at_rest and sure.eye is not None:
+            track.remember(sure)
+        return track.last_at_rest
 
     def _is_hidden(self, obj: Object) -> bool:
         return self._detected.is_hidden(obj, -math.inf, self._tracking.hidden_after)
@@ -374,7 +390,7 @@ class ServoedRobot:
     def _follow_carried(self, hand: HandState) -> None:
         """Find out what goes with the hand from now on, and where in it that is."""
         if self._carried is None:
-            if hand.closing and stands(hand):
+            if hand.closing:
                 self._carried = self._grasped(hand)
             return
         body = self._model.scene.free[self._carried.index]
@@ -382,19 +398,25 @@ class ServoedRobot:
         if newest.stamp_s > self._carried.seen_s:
             then = grasp_pose(self._reading_at(newest.stamp_s).joints)
             self._carried = self._carried.seen(newest, then)
+        if newest.eye is not None and stands(hand):
+            self._carried = self._carried.centred(hand, body.parts)
         pose = hand.pose.compose(self._carried.pose)
         if not (hand.closing and is_between(hand, body.parts, pose)):
             self._carried = None
         elif newest.eye is not None:
             now_s = self._readings[-1].stamp_s
             self._let_go[self._object(body.name)] = Detection(now_s, pose, eye=newest.eye)
+            self._track(body.name).forget()
 
     def _grasped(self, hand: HandState) -> CarriedBody | None:
-        """The body that is between the fingers: where it was detected, or gone with them since."""
+        """The body that is between the fingers: where it was detected, or gone with them since.
+
+        What a camera saw goes with them from when they touch it: it does not see that they move it.
+        """
         now_s = self._readings[-1].stamp_s
         for i, body in enumerate(self._model.scene.free):
             motion = self._motion(self._object(body.name))
-            if motion is None:
+            if motion is None or not (stands(hand) or motion.eye is not None):
                 continue
             seen_s = self._track(body.name).newest_s
             then = grasp_pose(self._reading_at(seen_s).joints)

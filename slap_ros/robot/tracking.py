@@ -127,8 +127,9 @@ class Track:
     def newest_motion(self, since_s: float = -math.inf) -> PoseEstimate | None:
         """The pose and its motion from the last detections; None if they are too few since then.
 
-        They are all there is to know, unless an earlier pose at rest was remembered and explains
-        them as well.
+        They are all there is to know, unless a pose at rest was remembered: what does not explain
+        all of them has not moved as long as it explains one, for a tag that is about to be covered
+        seems to be elsewhere.
 
         Args:
             since_s: Time before which detections do not count, s.
@@ -136,11 +137,10 @@ class Track:
         few = [d for d in self._detections if d.stamp_s > since_s][-self._settings.confirmations :]
         if len(few) < self._settings.confirmations:
             return None
-        if not self._agree(few):
-            return _moving(few)
-        if self._known is not None and self._explains(self._known, few):
-            return self._merged(self._known, few)
-        return _standing(few)
+        known = self._known
+        if known is not None and any(self._near(d.pose, known.pose, 1.0, d.eye) for d in few):
+            return known
+        return _standing(few) if self._agree(few) else _moving(few)
 
     def estimate(self, since_s: float) -> PoseEstimate | None:
         """The pose and its motion from detections since then; None if they are too few."""
