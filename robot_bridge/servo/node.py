@@ -211,8 +211,11 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
 
     def _no_detection(self, since_s: float) -> NoDetectionError:
         missing = ", ".join(self._robot.undetected(since_s)) or "too few times: some object"
+        covered = ", ".join(self._robot.never_shown)
+        advice = f"; others are seen: move what is in front of {covered}, or the camera"
         return NoDetectionError(
             f"not detected within {self._settings.detection_timeout} s: {missing}"
+            + (advice if covered else "")
         )
 
     # -- episodes -------------------------------------------------------------------------------

@@ -223,6 +223,13 @@ class ServoedRobot:
         """Names of the objects that the last pictures do not show."""
         return [obj.name for obj in self._detected.tracks if self._is_hidden(obj)]
 
+    @property
+    def never_shown(self) -> list[str]:
+        """Names of the objects that no picture has ever shown, where pictures show others."""
+        never = self._detected.never_seen()
+        others = self._detected.has_pictures and len(never) < len(self._detected.tracks)
+        return [obj.name for obj in never] if others else []
+
     # -- states ---------------------------------------------------------------------------------
 
     def begin(self, since_s: float) -> State | None:

@@ -17,7 +17,9 @@ from slap_ros.geometry.pose import Pose, Quaternion, Vector, from_yaw, multiply,
 from slap_ros.vision.tags import SHARE_OF_FACE
 from slap_ros.worlds.contact.scene import INSCRIBED, BoxPart, Part
 
-SMALLEST_TAG = 0.01  # m; smaller ones are not seen across a table
+SMALLEST_PLACED = (
+    0.015  # m; across a table, smaller ones seem to be centimetres from where they are
+)
 SIZE_STEP = 0.0005  # m, of which sizes are multiples
 MOST_IN_A_ROW = 4  # on a long face; the outermost, since hands grasp in the middle
 CLEARANCE = 0.001  # m, before a tag, within which nothing else of the body is
@@ -67,12 +69,11 @@ def tag_places(parts: Sequence[Part]) -> TagPlaces:
         parts: Parts of the body, or of its moving part, in one frame.
 
     Returns:
-        Their size and their poses; a size that is less than :data:`SMALLEST_TAG` where no tag has
-        room.
+        Their size and their poses; a size below :data:`SMALLEST_PLACED` where no tag has room.
     """
     faces = [face for part in parts for face in _faces(part)]
     sizes = {face.size for face in faces}
-    found = [_of_size(size, faces, parts) for size in sizes if size >= SMALLEST_TAG]
+    found = [_of_size(size, faces, parts) for size in sizes if size >= SMALLEST_PLACED]
     return max(found, key=_worth, default=TagPlaces(max(sizes), ()))
 
 

@@ -21,7 +21,7 @@ from slap_ros.errors import InvalidSceneError
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Object, State
 from slap_ros.robot.scene_config import SceneConfig, moving_name, opens, sampled_scene_config
-from slap_ros.robot.tag_places import SMALLEST_TAG, tag_places
+from slap_ros.robot.tag_places import SMALLEST_PLACED, tag_places
 from slap_ros.vision.tags import SHARE_OF_FACE, tag_frame, tag_of_frame
 from slap_ros.worlds.contact.features import DRAWER_FEATURES
 from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
@@ -33,6 +33,7 @@ from slap_ros.worlds.joint_space.scene import Box
 from slap_ros.worlds.joint_space.world import PandaWorld
 
 ROBOTS = (ROBOT, HAND_OF_FORCES)
+SMALLEST_TAG = 0.01  # m; smaller ones are not seen across a table
 DECIMALS = 9  # of numbers in the file
 HALF_SIZES = ("half_x", "half_y", "half_z")  # features of a box
 
@@ -156,7 +157,8 @@ def _tag_entry(parts: Sequence[Part], obj: Object, numbers: Iterator[int]) -> di
     places = tag_places(parts)
     if not places.poses:
         raise InvalidSceneError(
-            f"{obj.name} is too small for tags: its largest would be {1000.0 * places.size:.1f} mm"
+            f"{obj.name} is too small for tags: its largest would be {1000.0 * places.size:.1f} mm "
+            f"on its flat faces, and a camera across a table needs {1000.0 * SMALLEST_PLACED:.0f} mm"
         )
     frames = {tag_frame(next(numbers)): _numbers(pose.inverse()) for pose in places.poses}
     return {"tag_size": round(places.size, DECIMALS), "frames": frames}
