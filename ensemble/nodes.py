@@ -202,5 +202,10 @@ def _mujoco_parameters(
     }
     if camera:
         detected = {key: task[key] for key in ("domain", "preset", "skills")}
-        nodes["robot_bridge.tag_detector"] = {**detected, **scene}
+        # A raw picture is millions of bytes, and a busy machine loses most of several a second.
+        nodes["robot_bridge.tag_detector"] = {
+            **detected,
+            **scene,
+            "compressed": settings.servo,
+        }
     return nodes

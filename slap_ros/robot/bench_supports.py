@@ -12,7 +12,7 @@ from slap_ros.worlds.contact.scene import ContactScene, Part
 from slap_ros.worlds.contact.snapshot import Opening, Placement
 from slap_ros.worlds.joint_space.settling import resting_poses
 from slap_ros.worlds.layout_index import BodyState
-from slap_ros.worlds.settling import levelled
+from slap_ros.worlds.settling import FLOATING, levelled
 
 PRESSED = 0.005  # m, by which what is carried may seem to be inside what it is put down on
 
@@ -37,6 +37,25 @@ def put_down(
     fixed = list(_supports(scene, placement, openings))
     found = resting_poses(measured, scene.free, fixed, eyes)
     return tuple(one._replace(pose=found.get(i, one.pose)) for i, one in enumerate(bodies))
+
+
+def moving_support(
+    scene: ContactScene, parts: Sequence[Pose], index: int, pose: Pose
+) -> int | None:
+    """Index of the drawer or lid on whose moving part a body lies; None where it does on none.
+
+    Args:
+        scene: Bodies of the scene.
+        parts: Poses of the moving parts of the jointed bodies.
+        index: Index of the body.
+        pose: Pose of the body.
+    """
+    box = scene.free[index].at(pose)
+    for k, (jointed, part) in enumerate(zip(scene.jointed, parts, strict=True)):
+        for other in _boxes(jointed.moving, part):
+            if _is_over(box, other) and abs(box.bottom - other.top) <= FLOATING:
+                return k
+    return None
 
 
 def lifted_out(

@@ -8,7 +8,8 @@ move as their last detections do, and so does what slides or turns of a drawer o
 how far that is open. What is between fingers that were told to close and stand is held:
 it goes with the hand, for detections are older than encoders. And what was told is known.
 
-A camera does not see what the arm hides: that is where it was seen last, or where it was let go.
+A camera does not see what the arm or a roof hides: that is where it was seen last, or where it was
+let go, or has gone with the drawer that it lies in.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ from slap_ros.errors import (
     InvalidStateError,
     NoJointStateError,
 )
-from slap_ros.geometry.pose import Pose, Vector
+from slap_ros.geometry.pose import ORIGIN, Pose, Vector
 from slap_ros.relational import Object, State
-from slap_ros.robot.bench_supports import lifted_out, put_down
+from slap_ros.robot.bench_supports import lifted_out, moving_support, put_down
 from slap_ros.robot.carried_body import CarriedBody, is_between
 from slap_ros.robot.detected_objects import DetectedObjects
 from slap_ros.robot.joint_reading import JointReading
@@ -151,6 +152,7 @@ class ServoedRobot:
         self._tracking = tracking
         self._detected = DetectedObjects(scene_config, tracking, self._in_hand, self._openings)
         self._carried: CarriedBody | None = None
+        self._aboard: dict[int, tuple[int, Pose]] = {}  # bodies: in which drawer's part, and where
         self._lying: dict[int, Pose] = {}  # on what supports them, of bodies that a camera saw last
         self._let_go: dict[Object, Detection] = {}  # where and when the hand had something last
         self._readings: deque[JointReading] = deque(maxlen=REMEMBERED)
@@ -277,6 +279,7 @@ class ServoedRobot:
         bodies, openings = self._bodies(hand), self._measured_openings()
         if bodies is None or openings is None:
             return None
+        bodies = self._with_drawers(bodies, openings)
         eyes = self._eyes(bodies)
         bodies = put_down(self._model.scene, self._placement, bodies, openings, eyes)
         self._lying = {i: bodies[i].pose for i in eyes}
@@ -321,12 +324,44 @@ class ServoedRobot:
             found.append(BodyState(motion.pose, motion.velocity, motion.spin))
         return tuple(found)
 
+    def _with_drawers(
+        self, bodies: Sequence[BodyState], openings: Sequence[Opening]
+    ) -> tuple[BodyState, ...]:
+        """The bodies, with hidden ones gone with the drawers that they were seen in, or let go in.
+
+        Args:
+            bodies: How the bodies lie or move, as they were seen last.
+            openings: How far drawers and lids are open.
+        """
+        scene, found = self._model.scene, list(bodies)
+        jointed = zip(scene.jointed, self._placement.jointed, openings, strict=True)
+        parts = [body.moving_pose(pose, opening.position) for body, pose, opening in jointed]
+        for i, body in enumerate(scene.free):
+            hidden = self._is_hidden(self._object(body.name))
+            if self._carried is not None and self._carried.index == i:
+                self._aboard.pop(i, None)
+            elif hidden and i in self._aboard:
+                k, pose = self._aboard[i]
+                found[i] = BodyState(parts[k].compose(pose), ORIGIN, ORIGIN)
+            elif bodies[i].still:
+                self._aboard.pop(i, None)
+                support = moving_support(scene, parts, i, bodies[i].pose)
+                if support is not None:
+                    in_part = parts[support].inverse().compose(bodies[i].pose)
+                    self._aboard[i] = support, in_part
+        return tuple(found)
+
     def _eyes(self, bodies: Sequence[BodyState]) -> dict[int, Vector]:
         """Where the camera is that saw a body at rest, by the body's index."""
         names = [body.name for body in self._model.scene.free]
         eyes = {i: self._track(name).newest.eye for i, name in enumerate(names) if bodies[i].still}
         carried = None if self._carried is None else self._carried.index
-        return {i: eye for i, eye in eyes.items() if eye is not None and i != carried}
+        hidden = {i for i in self._aboard if self._is_hidden(self._object(names[i]))}
+        return {
+            i: eye
+            for i, eye in eyes.items()
+            if eye is not None and i != carried and i not in hidden
+        }
 
     def _off_support(
         self, hand: HandState, bodies: tuple[BodyState, ...], openings: Sequence[Opening]

@@ -158,7 +158,7 @@ def _tag_entry(parts: Sequence[Part], obj: Object, numbers: Iterator[int]) -> di
     if not places.poses:
         raise InvalidSceneError(
             f"{obj.name} is too small for tags: its largest would be {1000.0 * places.size:.1f} mm "
-            f"on its flat faces, and a camera across a table needs {1000.0 * SMALLEST_PLACED:.0f} mm"
+            f"on its flat faces, and a camera needs {1000.0 * SMALLEST_PLACED:.0f} mm"
         )
     frames = {tag_frame(next(numbers)): _numbers(pose.inverse()) for pose in places.poses}
     return {"tag_size": round(places.size, DECIMALS), "frames": frames}

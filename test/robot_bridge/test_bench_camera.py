@@ -11,18 +11,20 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.domains.make_coffee.scenery import holder
 from slap_ros.domains.stow_hammer.scenery import SHAPE, hammer
+from slap_ros.errors import InvalidSceneError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.servoed_robot import ServoedRobot
 from slap_ros.robot.tag_places import tag_places
+from slap_ros.robot.tagged_scene import tagged_scene
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.vision.tags import SHARE_OF_FACE
 from slap_ros.worlds.bodies import WOOD
 from slap_ros.worlds.contact.arm import arm_joints
 from slap_ros.worlds.contact.hand import hand_at
 from slap_ros.worlds.contact.scene import BoxPart
-from slap_ros.worlds.features import pose_of
+from slap_ros.worlds.features import pose_features, pose_of
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pupil_apriltags")
@@ -77,12 +79,18 @@ class SeenBench:
             self.robot.add_joint_reading(reading)
 
 
-def seen_bench(name, camera, opening=None):
+def seen_bench(name, camera, opening=None, inside=None):
     domain = get_domain(name, "fair:hand=panda")
     initial = domain.task(SEED).initial_state
     if opening is not None:
         obj, value = initial.layout.object(opening[0]), opening[1]
         initial = initial.replace({(obj, "opening"): value})
+    for thing, (cabinet, at) in (inside or {}).items():
+        obj = initial.layout.object(thing)
+        frame = pose_of(initial, initial.layout.object(cabinet))
+        part = frame.compose(Pose((0.0, opening[1], 0.0)))
+        features = pose_features(part.compose(at))
+        initial = initial.replace({(obj, name): value for name, value in features.items()})
     detector = TagCameraDetector(domain, initial, camera)
     try:
         found = detector.detect()
@@ -157,12 +165,33 @@ def test_what_pictures_no_longer_show_is_hidden_and_where_it_was(stack):
     assert not stack.robot.hidden
 
 
+def test_what_a_roof_hides_has_gone_with_its_drawer():
+    """The front is seen to move in, and the hammer in the drawer is not seen any more."""
+    inside = {"hammer0": ("cabinet1", Pose((0.0, -0.07, 0.052)))}
+    bench = seen_bench("stow_hammer", AT_FRONTS, ("cabinet1", 0.15), inside)
+    state = begun(bench, hand_at((0.45, 0.0, 0.25), 0.5 * math.pi).pose)
+    before = pose_of(state, state.layout.object("hammer0")).position
+    assert math.dist(before, bench.poses["hammer0"].position) < 3e-3
+    shut = seen_bench("stow_hammer", AT_FRONTS, ("cabinet1", 0.01))
+    bench.found = shut.found
+    for _ in range(HIDDEN_AFTER + 1):
+        bench.look(without=("hammer0",))
+        bench.hold(hand_at((0.45, 0.0, 0.25), 0.5 * math.pi).pose, OPEN)
+    state = bench.robot.measure(0.0)
+    assert bench.robot.hidden == ["hammer0"]
+    after = pose_of(state, state.layout.object("hammer0")).position
+    moved = [a.position for a in (shut.poses["cabinet1_moving"], bench.poses["cabinet1_moving"])]
+    way = np.subtract(*moved)
+    assert math.hypot(*way) == pytest.approx(0.14, abs=2e-3)
+    assert np.subtract(after, before) == pytest.approx(way, abs=3e-3)
+
+
 def test_what_no_picture_has_shown_is_not_hidden_but_missing(stack):
     for _ in range(2 * HIDDEN_AFTER):
         stack.look(without=("cube1",))
         stack.hold(ABOVE, OPEN)
     assert stack.robot.begin(0.0) is None
-    assert stack.robot.undetected(0.0) == ["cube1"]
+    assert stack.robot.undetected(0.0) == stack.robot.never_shown == ["cube1"]
 
 
 def test_what_the_hand_covers_goes_with_it_and_stays_where_it_is_let_go(stack):
@@ -236,6 +265,13 @@ def _touches(box, point):
     inside = box.pose.inverse().apply(point)
     gaps = [half - abs(value) for half, value in zip(box.half, inside, strict=True)]
     return min(gaps) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_is_too_small_for_a_tag_that_a_camera_sees_is_named():
+    """Of a peg, only the ends are flat."""
+    domain = get_domain("peg_in_hole")
+    with pytest.raises(InvalidSceneError, match=r"peg1 is too small .* 13\.5 mm .* needs 15 mm"):
+        tagged_scene(domain, domain.task(SEED).initial_state)
 
 
 def test_a_drawers_front_has_tags_beside_its_handle():
