@@ -279,16 +279,19 @@ class ServoedRobot:
         bodies, openings = self._bodies(hand), self._measured_openings()
         if bodies is None or openings is None:
             return None
-        bodies = self._with_drawers(bodies, openings)
+        jointed = zip(self._model.scene.jointed, self._placement.jointed, openings, strict=True)
+        parts = [body.moving_pose(pose, opening.position) for body, pose, opening in jointed]
+        bodies = self._with_drawers(bodies, parts)
         eyes = self._eyes(bodies)
         bodies = put_down(self._model.scene, self._placement, bodies, openings, eyes)
         self._lying = {i: bodies[i].pose for i in eyes}
+        self._note_aboard(bodies, parts)
         bodies = self._off_support(hand, bodies, openings)
         held = self._carried.index if self._carried is not None and stands(hand) else None
         snapshot = ContactSnapshot(joints, hand, bodies, openings, held)
         state = self._index.write(self._template, snapshot)
         state.require_finite()
-        require_possible_bodies(self._model.scene, snapshot, self._placement)
+        require_possible_bodies(self._model.scene, snapshot, self._placement, self.hidden)
         self._state = state
         return state
 
@@ -325,42 +328,55 @@ class ServoedRobot:
         return tuple(found)
 
     def _with_drawers(
-        self, bodies: Sequence[BodyState], openings: Sequence[Opening]
+        self, bodies: Sequence[BodyState], parts: Sequence[Pose]
     ) -> tuple[BodyState, ...]:
         """The bodies, with hidden ones gone with the drawers that they were seen in, or let go in.
 
         Args:
             bodies: How the bodies lie or move, as they were seen last.
-            openings: How far drawers and lids are open.
+            parts: Poses of what opens of drawers and lids.
         """
-        scene, found = self._model.scene, list(bodies)
-        jointed = zip(scene.jointed, self._placement.jointed, openings, strict=True)
-        parts = [body.moving_pose(pose, opening.position) for body, pose, opening in jointed]
-        for i, body in enumerate(scene.free):
-            hidden = self._is_hidden(self._object(body.name))
-            if self._carried is not None and self._carried.index == i:
-                self._aboard.pop(i, None)
-            elif hidden and i in self._aboard:
-                k, pose = self._aboard[i]
-                found[i] = BodyState(parts[k].compose(pose), ORIGIN, ORIGIN)
-            elif bodies[i].still:
-                self._aboard.pop(i, None)
-                support = moving_support(scene, parts, i, bodies[i].pose)
-                if support is not None:
-                    in_part = parts[support].inverse().compose(bodies[i].pose)
-                    self._aboard[i] = support, in_part
+        found = list(bodies)
+        for i in self._hidden_aboard:
+            k, pose = self._aboard[i]
+            found[i] = BodyState(parts[k].compose(pose), ORIGIN, ORIGIN)
         return tuple(found)
+
+    def _note_aboard(self, bodies: Sequence[BodyState], parts: Sequence[Pose]) -> None:
+        """Keep which bodies lie in drawers, and where in them.
+
+        Args:
+            bodies: How the bodies lie or move.
+            parts: Poses of what opens of drawers and lids.
+        """
+        hidden = self._hidden_aboard
+        for i, body in enumerate(bodies):
+            if i in hidden or not (body.still or self._is_carried(i)):
+                continue
+            self._aboard.pop(i, None)
+            support = moving_support(self._model.scene, parts, i, body.pose)
+            if support is not None and not self._is_carried(i):
+                self._aboard[i] = support, parts[support].inverse().compose(body.pose)
+
+    @property
+    def _hidden_aboard(self) -> set[int]:
+        """Indices of hidden bodies that lie in drawers."""
+        free = self._model.scene.free
+        hidden = {i for i in self._aboard if self._is_hidden(self._object(free[i].name))}
+        return {i for i in hidden if not self._is_carried(i)}
+
+    def _is_carried(self, index: int) -> bool:
+        return self._carried is not None and self._carried.index == index
 
     def _eyes(self, bodies: Sequence[BodyState]) -> dict[int, Vector]:
         """Where the camera is that saw a body at rest, by the body's index."""
         names = [body.name for body in self._model.scene.free]
         eyes = {i: self._track(name).newest.eye for i, name in enumerate(names) if bodies[i].still}
-        carried = None if self._carried is None else self._carried.index
-        hidden = {i for i in self._aboard if self._is_hidden(self._object(names[i]))}
+        aboard = self._hidden_aboard
         return {
             i: eye
             for i, eye in eyes.items()
-            if eye is not None and i != carried and i not in hidden
+            if eye is not None and i not in aboard and not self._is_carried(i)
         }
 
     def _off_support(

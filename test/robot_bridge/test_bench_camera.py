@@ -39,7 +39,7 @@ BY_CAMERA = TrackingSettings(0.0005, 0.005, hidden_after=HIDDEN_AFTER)
 PICTURE_S = 0.05
 # It looks at the fronts of drawers, past the arm.
 AT_FRONTS = CameraSettings(
-    PinholeCamera.centred(1920, 1080, 1600.0), looking_at((-0.2, -0.5, 0.6), (0.5, 0.03, 0.03))
+    PinholeCamera.centred(1920, 1080, 1600.0), looking_at((-0.2, 0.5, 0.6), (0.5, -0.03, 0.03))
 )
 CLOSED_ON_CUBE = 0.04  # m, between fingers that press on a cube
 OPEN = 0.08  # m
