@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -281,11 +281,12 @@ class ServoedRobot:
             return None
         jointed = zip(self._model.scene.jointed, self._placement.jointed, openings, strict=True)
         parts = [body.moving_pose(pose, opening.position) for body, pose, opening in jointed]
-        bodies = self._with_drawers(bodies, parts)
-        eyes = self._eyes(bodies)
+        gone = self._gone_along(openings)
+        bodies = self._with_drawers(bodies, parts, gone)
+        eyes = self._eyes(bodies, gone)
         bodies = put_down(self._model.scene, self._placement, bodies, openings, eyes)
         self._lying = {i: bodies[i].pose for i in eyes}
-        self._note_aboard(bodies, parts)
+        self._note_aboard(bodies, parts, gone)
         bodies = self._off_support(hand, bodies, openings)
         held = self._carried.index if self._carried is not None and stands(hand) else None
         snapshot = ContactSnapshot(joints, hand, bodies, openings, held)
@@ -328,55 +329,70 @@ class ServoedRobot:
         return tuple(found)
 
     def _with_drawers(
-        self, bodies: Sequence[BodyState], parts: Sequence[Pose]
+        self, bodies: Sequence[BodyState], parts: Sequence[Pose], gone: Collection[int]
     ) -> tuple[BodyState, ...]:
-        """The bodies, with hidden ones gone with the drawers that they were seen in, or let go in.
+        """The bodies, with some gone with the drawers that they were seen in, or let go in.
 
         Args:
             bodies: How the bodies lie or move, as they were seen last.
             parts: Poses of what opens of drawers and lids.
+            gone: Indices of those that have gone along.
         """
         found = list(bodies)
-        for i in self._hidden_aboard:
+        for i in gone:
             k, pose = self._aboard[i]
             found[i] = BodyState(parts[k].compose(pose), ORIGIN, ORIGIN)
         return tuple(found)
 
-    def _note_aboard(self, bodies: Sequence[BodyState], parts: Sequence[Pose]) -> None:
+    def _note_aboard(
+        self, bodies: Sequence[BodyState], parts: Sequence[Pose], gone: Collection[int]
+    ) -> None:
         """Keep which bodies lie in drawers, and where in them.
 
         Args:
             bodies: How the bodies lie or move.
             parts: Poses of what opens of drawers and lids.
+            gone: Indices of bodies that have gone along with drawers.
         """
-        hidden = self._hidden_aboard
         for i, body in enumerate(bodies):
-            if i in hidden or not (body.still or self._is_carried(i)):
+            by_camera = self._track(self._model.scene.free[i].name).newest.eye is not None
+            if i in gone or not by_camera or not (body.still or self._is_carried(i)):
                 continue
             self._aboard.pop(i, None)
             support = moving_support(self._model.scene, parts, i, body.pose)
             if support is not None and not self._is_carried(i):
                 self._aboard[i] = support, parts[support].inverse().compose(body.pose)
 
-    @property
-    def _hidden_aboard(self) -> set[int]:
-        """Indices of hidden bodies that lie in drawers."""
+    def _gone_along(self, openings: Sequence[Opening]) -> set[int]:
+        """Indices of bodies in drawers that are hidden, or whose drawers move.
+
+        Args:
+            openings: How far drawers and lids are open.
+        """
         free = self._model.scene.free
-        hidden = {i for i in self._aboard if self._is_hidden(self._object(free[i].name))}
-        return {i for i in hidden if not self._is_carried(i)}
+        return {
+            i
+            for i, (part, _) in self._aboard.items()
+            if not self._is_carried(i)
+            and (not openings[part].still or self._is_hidden(self._object(free[i].name)))
+        }
 
     def _is_carried(self, index: int) -> bool:
         return self._carried is not None and self._carried.index == index
 
-    def _eyes(self, bodies: Sequence[BodyState]) -> dict[int, Vector]:
-        """Where the camera is that saw a body at rest, by the body's index."""
+    def _eyes(self, bodies: Sequence[BodyState], gone: Collection[int]) -> dict[int, Vector]:
+        """Where the camera is that saw a body at rest, by the body's index.
+
+        Args:
+            bodies: How the bodies lie or move.
+            gone: Indices of bodies that have gone along with drawers.
+        """
         names = [body.name for body in self._model.scene.free]
         eyes = {i: self._track(name).newest.eye for i, name in enumerate(names) if bodies[i].still}
-        aboard = self._hidden_aboard
         return {
             i: eye
             for i, eye in eyes.items()
-            if eye is not None and i not in aboard and not self._is_carried(i)
+            if eye is not None and i not in gone and not self._is_carried(i)
         }
 
     def _off_support(
