@@ -32,6 +32,9 @@ def put_down(
         bodies: How the free bodies lie or move.
         openings: How far drawers and lids are open.
         eyes: Where the camera is that saw a body at rest, by its index; others stay as they are.
+
+    Returns:
+        The free bodies in the same order.
     """
     measured = {i: bodies[i].pose for i in eyes}
     fixed = list(_supports(scene, placement, openings))
@@ -42,13 +45,16 @@ def put_down(
 def moving_support(
     scene: ContactScene, parts: Sequence[Pose], index: int, pose: Pose
 ) -> int | None:
-    """Index of the drawer or lid on whose moving part a body lies; None where it does on none.
+    """The drawer or lid on whose moving part a body lies.
 
     Args:
         scene: Bodies of the scene.
         parts: Poses of the moving parts of the jointed bodies.
         index: Index of the body.
         pose: Pose of the body.
+
+    Returns:
+        Index among the jointed bodies; None where it lies on none of them.
     """
     box = scene.free[index].at(pose)
     for k, (jointed, part) in enumerate(zip(scene.jointed, parts, strict=True)):
