@@ -16,6 +16,7 @@ from ensemble.robot_parameters import (
     BEFORE_MUJOCO_AT_A_BENCH,
     MUJOCO_AT_A_BENCH,
     OF_JOINTS,
+    Parameters,
 )
 from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, MUJOCO, SIM
 from slap_ros.shortcuts.sampling import DEFAULT
@@ -46,9 +47,18 @@ ROBOT_STATE_TIMEOUT = 8.0
 SLOW_CAMERA_TIMEOUT = 15.0
 # s until the robot holds, where the clock of a simulated FR3 waits for a busy machine.
 SLOW_CLOCK_TIMEOUT = 60.0
-WAITING = ("detection_timeout", "controller_timeout", "joint_timeout", "settle_time")
+WAITING = ("detection_timeout", "joint_timeout")
 HIDDEN_AFTER = 5  # pictures without an object: the arm hides what is behind it
-BEFORE_CAMERA = {**dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT), "hidden_after": HIDDEN_AFTER}
+# How fast a robot at a bench moves before such a camera: a few pictures a second, each some tenths
+# of a second late, are then as 15 Hz and 60 ms.
+RENDERED_PACE = 0.2
+BEFORE_CAMERA_AT_A_BENCH = {
+    **dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT),
+    "hidden_after": HIDDEN_AFTER,
+}
+BEFORE_CAMERA = BEFORE_CAMERA_AT_A_BENCH | dict.fromkeys(
+    ("controller_timeout", "settle_time"), SLOW_CAMERA_TIMEOUT
+)
 # Of whoever sends goals to a simulated FR3, whose clock may be slow.
 SLOW_CLOCK: Mapping[str, float] = MappingProxyType(
     dict.fromkeys(("gripper_timeout", "controller_timeout", "joint_timeout"), SLOW_CLOCK_TIMEOUT)
@@ -96,7 +106,7 @@ class RunSettings:
     acquisition: Mapping[str, str | int | float] | None = None
 
 
-def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
+def node_parameters(settings: RunSettings) -> dict[str, Parameters]:
     """The ROS parameters of every node of the ensemble, by node name."""
     learned: dict[str, str | int | float] = {"samples": settings.samples}
     if settings.shortcuts:
@@ -117,7 +127,7 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
         "patience": settings.patience,
     }
     common |= _libraries(settings)
-    nodes: dict[str, Mapping[str, str | int | float]] = {
+    nodes: dict[str, Parameters] = {
         **_world_parameters(settings),
         "perception_node": {**settings.perception, **common},
         "skill_server": learned | waiting | common,
@@ -136,7 +146,7 @@ def _libraries(settings: RunSettings) -> dict[str, str]:
     return {"libraries": str(Path(str(output)).absolute())} if output else {}
 
 
-def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
+def _world_parameters(settings: RunSettings) -> dict[str, Parameters]:
     """Whatever is in the world's place."""
     task: dict[str, str | int | float] = {
         "domain": settings.domain.name,
@@ -160,17 +170,42 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
         return {"robot_bridge.franka": task | dict(settings.franka) | simulated} | bridge
     if settings.world == MOCK:
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
-    if settings.servo:
-        passing = {"pace": settings.mujoco.get("pace", 1.0)}
-        servo = task | scene | dict(BEFORE_MUJOCO_AT_A_BENCH) | passing | dict(settings.bridge)
-        pulled = {} if settings.mujoco.keys() & OF_JOINTS else dict(MUJOCO_AT_A_BENCH)
-        robot = task | pulled | dict(settings.mujoco)
-        return {"robot_bridge.mujoco": robot, "robot_bridge.servo": servo}
     if settings.world == MUJOCO:
-        camera = bool(settings.mujoco.get("camera"))
-        before = dict(BEFORE_MUJOCO) | (BEFORE_CAMERA if camera else {})
-        bridge["robot_bridge"] = before | bridge["robot_bridge"]
-        robot = {"robot_bridge.mujoco": task | (scene if camera else {}) | dict(settings.mujoco)}
-        detector = {name: task[name] for name in ("domain", "preset", "skills")} | scene
-        return robot | ({"robot_bridge.tag_detector": detector} if camera else {}) | bridge
+        return _mujoco_parameters(settings, task, scene)
     return bridge
+
+
+def _mujoco_parameters(
+    settings: RunSettings, task: Parameters, scene: Parameters
+) -> dict[str, Parameters]:
+    """The robot in MuJoCo, the bridge to it, and what finds tags where it has a camera.
+
+    Args:
+        settings: What is to be run.
+        task: Parameters of whatever begins with the task.
+        scene: The scene file as a parameter, if there is one.
+    """
+    camera = bool(settings.mujoco.get("camera"))
+    robot: Parameters = scene if camera else {}
+    before: Parameters
+    if settings.servo:
+        pulled = {} if settings.mujoco.keys() & OF_JOINTS else MUJOCO_AT_A_BENCH
+        robot = {"pace": RENDERED_PACE if camera else 1.0, **robot, **pulled, **settings.mujoco}
+        before = BEFORE_MUJOCO_AT_A_BENCH | (BEFORE_CAMERA_AT_A_BENCH if camera else {})
+        bridge, before = "robot_bridge.servo", before | {"pace": robot["pace"]}
+    else:
+        robot = {**robot, **settings.mujoco}
+        bridge, before = "robot_bridge", BEFORE_MUJOCO | (BEFORE_CAMERA if camera else {})
+    nodes = {
+        "robot_bridge.mujoco": {**task, **robot},
+        bridge: {**before, **task, **scene, **settings.bridge},
+    }
+    if camera:
+        detected = {key: task[key] for key in ("domain", "preset", "skills")}
+        # A raw picture is millions of bytes, and a busy machine loses most of several a second.
+        nodes["robot_bridge.tag_detector"] = {
+            **detected,
+            **scene,
+            "compressed": settings.servo,
+        }
+    return nodes

@@ -74,6 +74,9 @@ class RobotParameters:
     position_noise: float = parameter(0.002, "m, of detections, along each axis")
     turn_noise: float = parameter(0.01, "rad, of detections, about each axis")
     joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
+    hidden_after: int = parameter(
+        0, "pictures in a row without an object after which it is where it was; 0: never", high=64
+    )
 
     @property
     def space(self) -> Workspace:
@@ -91,8 +94,10 @@ class RobotParameters:
 
     @property
     def tracking(self) -> TrackingSettings:
-        """How well detections can be trusted."""
-        return TrackingSettings(self.position_noise, self.turn_noise)
+        """How well detections can be trusted, and when an object is taken to be hidden."""
+        return TrackingSettings(
+            self.position_noise, self.turn_noise, hidden_after=self.hidden_after
+        )
 
 
 @dataclass(frozen=True)
@@ -101,9 +106,6 @@ class PointToPointParameters(RobotParameters):
 
     speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
-    hidden_after: int = parameter(
-        0, "pictures in a row without an object after which it is where it was; 0: never", high=64
-    )
     controller_timeout: float = parameter(0.5, "s that a controller may take longer than it should")
     gripper_timeout: float = parameter(5.0, "s that the gripper may take")
     arrival_tolerance: float = parameter(0.1, "rad that a joint may be off after a motion")
@@ -116,11 +118,6 @@ class PointToPointParameters(RobotParameters):
             InvalidParameterError: An unknown arm, or a speed or workspace that there is not.
         """
         return arm_limits(self.arm).scaled(self.speed, self.space)
-
-    @property
-    def tracking(self) -> TrackingSettings:
-        """How well detections can be trusted, and when an object is taken to be hidden."""
-        return replace(super().tracking, hidden_after=self.hidden_after)
 
 
 @dataclass(frozen=True)

@@ -215,6 +215,8 @@ def _parameter_files(given: Mapping[str, str]) -> list[str]:
         files.append(_config() / "servo.yaml")
     if given["world"] == "mujoco" and given["camera"] == "true":
         files.append(_config() / "camera.yaml")
+        if given["servo"] == "true":
+            files.append(_config() / "servo_camera.yaml")
     if "params_file" in given:
         files.append(Path(given["params_file"]).expanduser())
         if not files[-1].is_file():

@@ -232,7 +232,6 @@ def _check_world(options: RunOptions, domain: Domain, task: Task) -> bool:
 
     servo = options.world == MUJOCO and is_servoed(domain)
     if servo:
-        _require_frames(options)
         scene = chosen_scene_config(str(options.scene or ""), domain, lambda: task.initial_state)
         require_servoed(domain, scene)
     else:
@@ -243,19 +242,6 @@ def _check_world(options: RunOptions, domain: Domain, task: Task) -> bool:
         require_mujoco()
         _require_camera(options, domain)
     return servo
-
-
-def _require_frames(options: RunOptions) -> None:
-    """Refuse to detect things at a bench by pictures.
-
-    Raises:
-        InvalidParameterError: There is a camera.
-    """
-    if parse_mujoco_robot(options.mujoco).get("camera"):
-        raise InvalidParameterError(
-            f"{options.domain} has no camera: its robot is commanded while it moves, and "
-            "detections must not wait until it stands"
-        )
 
 
 def _require_camera(options: RunOptions, domain: Domain) -> None:

@@ -26,6 +26,8 @@ ROS Parameters:
         gripper_effort (double, 20.0): as robot_bridge's.
     position_noise (double, 0.0005), turn_noise (double, 0.005): standard deviation of detections
         along each axis in m, about each axis in rad. What moves by less counts as at rest.
+    hidden_after (int, 0): pictures in a row that do not show an object, after which it is where it
+        was, or where the hand has it or let it go; 0: never.
     joint_timeout (double, 0.5): s without joint positions after which the robot holds.
     detection_timeout (double, 2.0): s without a complete measurement after which it holds.
     hold_after (double, 0.5): s without a command after which diagnostics report that it holds.
@@ -37,7 +39,8 @@ Publishers:
         (visualization_msgs/MarkerArray): as sim_node.
     trajectory_topic (trajectory_msgs/JointTrajectory): two points, from where the joints were told
         to be to where they are to be a control period later.
-    diagnostics (diagnostic_msgs/DiagnosticArray): phase, fault, counts; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): phase, fault, counts, and the objects that the
+        last pictures do not show; 1 Hz.
 
 Subscribers:
     slap/command (slap_msgs/RobotCommand): refused unless it answers the current state and is safe.
@@ -143,7 +146,8 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
         ready = self._phase is ServoPhase.READY
         holding = self._phase is ServoPhase.FAULT or (ready and self._is_idle)
         counts = {**super()._diagnostics(), **self._sensors.counts}
-        return {**counts, "phase": self._phase.name, "holding": holding}
+        hidden = ", ".join(self._robot.hidden)
+        return {**counts, "phase": self._phase.name, "holding": holding, "hidden": hidden}
 
     def _occupation(self) -> str:
         return "" if self._phase is ServoPhase.READY else self._phase.value
@@ -207,8 +211,11 @@ class ServoBridge(Bridge[ServoBridgeParameters]):
 
     def _no_detection(self, since_s: float) -> NoDetectionError:
         missing = ", ".join(self._robot.undetected(since_s)) or "too few times: some object"
+        covered = ", ".join(self._robot.never_shown)
+        advice = f"; others are seen: move what is in front of {covered}, or the camera"
         return NoDetectionError(
             f"not detected within {self._settings.detection_timeout} s: {missing}"
+            + (advice if covered else "")
         )
 
     # -- episodes -------------------------------------------------------------------------------

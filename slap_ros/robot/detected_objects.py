@@ -80,18 +80,19 @@ class DetectedObjects:
     def _add(self, obj: Object, how: DetectedFrame, stamp_s: float, base: Pose, seen: Pose) -> None:
         found, is_tag = measured_pose(*seen), how.tag_size is not None
         pose = base.compose(found).compose(how.offset)
+        if is_tag:
+            pose = self._likelier(obj, Ways.of(base, found, how.offset))
         if math.hypot(*pose.position) > FARTHEST:
             raise InvalidMeasurementError(
                 f"{obj.name} is detected {math.hypot(*pose.position):.6g} m away from the robot: "
                 "are positions in m?"
             )
+        if is_tag and is_slanted(found):
+            return
         if obj in self._openings:
             self._openings[obj].require_on_path(pose)
-        if not is_tag:
-            self.tracks[obj].add(Detection(stamp_s, pose, how.frame))
-        elif not is_slanted(found):
-            pose = self._likelier(obj, Ways.of(base, found, how.offset))
-            self.tracks[obj].add(Detection(stamp_s, pose, how.frame, base.position))
+        eye = base.position if is_tag else None
+        self.tracks[obj].add(Detection(stamp_s, pose, how.frame, eye))
 
     def add_picture(self, stamp_s: float) -> None:
         """Take that a picture was searched: what none of several shows is hidden.
@@ -104,6 +105,8 @@ class DetectedObjects:
 
     def _likelier(self, obj: Object, ways: Ways) -> Pose:
         """The likelier of the two ways in which a tag may be turned."""
+        if obj in self._openings:
+            return self._openings[obj].likelier(*ways)
         held, last = self._in_hand(obj), self.tracks[obj].last_at_rest
         if held is not None:
             return ways.in_hand(held)

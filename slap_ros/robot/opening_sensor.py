@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 
 from slap_ros.errors import InvalidMeasurementError
-from slap_ros.geometry.pose import Pose, dot, rotate
+from slap_ros.geometry.pose import Pose, Vector, dot, rotate
 from slap_ros.robot.tracking import PoseEstimate
 from slap_ros.worlds.contact.scene import JointedBody, JointKind
 from slap_ros.worlds.contact.snapshot import Opening, stopped_at_ends
@@ -22,6 +22,8 @@ from slap_ros.worlds.contact.snapshot import Opening, stopped_at_ends
 # that a person has put in its place is a few millimetres off.
 PATH_TOLERANCE_M = 0.02
 PATH_TOLERANCE_RAD = 0.1
+# Squared sine of the angle between a way and a line of sight, below which the way is seen head-on.
+HEAD_ON = 0.1
 
 
 @dataclass(frozen=True)
@@ -45,10 +47,7 @@ class OpeningSensor:
         Raises:
             InvalidMeasurementError: It is too far from the joint's path; says how far.
         """
-        joint = self.body.joint
-        nearest = self.body.moving_pose(
-            self.pose, min(max(self._opening_at(seen), 0.0), joint.high)
-        )
+        nearest = self._nearest(seen)
         off, turned = math.dist(seen.position, nearest.position), seen.angle_to(nearest)
         if off > PATH_TOLERANCE_M or turned > PATH_TOLERANCE_RAD:
             raise InvalidMeasurementError(
@@ -69,10 +68,47 @@ class OpeningSensor:
         """
         joint = self.body.joint
         axis = rotate(self.pose.compose(joint.mount).quaternion, joint.axis)
-        slides = joint.kind is JointKind.SLIDE
-        velocity = dot(axis, estimate.velocity if slides else estimate.spin)
-        position = self._opening_at(estimate.pose)
+        if joint.kind is JointKind.TURN:
+            position, velocity = self._opening_at(estimate.pose), dot(axis, estimate.spin)
+        else:
+            measured = _in_sight(axis, estimate)
+            shut = self.body.moving_pose(self.pose, 0.0).position
+            position = dot(measured, estimate.pose.position) - dot(measured, shut)
+            velocity = dot(measured, estimate.velocity)
         return Opening(*stopped_at_ends(position, velocity, joint.high))
+
+    def likelier(self, first: Pose, second: Pose) -> Pose:
+        """The one of two poses of the moving part that is turned as its joint can have it.
+
+        Args:
+            first: Pose in the robot's base; taken where both are as likely.
+            second: Another one.
+        """
+        return min(first, second, key=lambda pose: pose.angle_to(self._nearest(pose)))
+
+    def _nearest(self, seen: Pose) -> Pose:
+        opening = min(max(self._opening_at(seen), 0.0), self.body.joint.high)
+        return self.body.moving_pose(self.pose, opening)
 
     def _opening_at(self, seen: Pose) -> float:
         return self.body.joint.opening_at(self.pose.inverse().compose(seen))
+
+
+def _in_sight(axis: Vector, estimate: PoseEstimate) -> Vector:
+    """What measures how far something is along an axis: its product with an offset.
+
+    It is the axis itself, where no camera saw the thing. Else it is at a right angle to the line of
+    sight, because along that, places are off by a centimetre.
+
+    Args:
+        axis: Unit vector in the robot's base.
+        estimate: What is known of the thing's motion.
+    """
+    if estimate.eye is None:
+        return axis
+    offset = [a - b for a, b in zip(estimate.pose.position, estimate.eye, strict=True)]
+    sight = [part / math.hypot(*offset) for part in offset]
+    along = sum(a * b for a, b in zip(axis, sight, strict=True))
+    x, y, z = (a - along * s for a, s in zip(axis, sight, strict=True))
+    across = 1.0 - along * along
+    return (x / across, y / across, z / across) if across > HEAD_ON else axis

@@ -111,11 +111,20 @@ def sampled_scene_config(initial: State) -> SceneConfig:
 
     Of a drawer or a lid, the part that opens is detected, in a frame of that part's own name.
     """
-    names = {o: o.name for o in initial.objects if _has(o, "held")}
-    names |= {o: f"{o.name}{MOVING}" for o in initial.objects if _has(o, "opening")}
+    moving = [obj for obj in initial.objects if _has(obj, "held") or opens(obj)]
     return SceneConfig(
-        initial, {o: (DetectedFrame(f"{DETECTED}{name}"),) for o, name in names.items()}
+        initial, {obj: (DetectedFrame(f"{DETECTED}{moving_name(obj)}"),) for obj in moving}
     )
+
+
+def opens(obj: Object) -> bool:
+    """Whether a part of an object slides or turns, and the rest stands."""
+    return _has(obj, "opening")
+
+
+def moving_name(obj: Object) -> str:
+    """The name of what moves of an object: its own, or that of its part that opens."""
+    return f"{obj.name}{MOVING}" if opens(obj) else obj.name
 
 
 def _has(obj: Object, feature: str) -> bool:
@@ -197,7 +206,7 @@ def _object(
         raise ValueError(f"unknown type {entry.get('type')!r}; there are {', '.join(kinds)}")
     given = {str(k): float(v) for k, v in entry.get("features", {}).items()}
     obj = kinds[entry["type"]](name)
-    if _has(obj, "opening"):
+    if opens(obj):
         if "pose" not in entry or len(entry.keys() & {"frame", "frames"}) != 1:
             raise ValueError(
                 "what opens needs a pose, at which it stands, and either a frame, or several "

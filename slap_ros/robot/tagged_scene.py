@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tags on the objects of a scene: the scene file that bridge, detector and renderer read.
 
-Every face of an object has a tag, since the hand or another object may hide some. An object is
-where any of its tags says; several in one picture count as their mean.
+Every flat face of an object has tags, since the hand or another object may hide some. An object is
+where any of its tags says; several in one picture count as their mean. Of a drawer or a lid, the
+part that opens has the tags.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,22 +18,24 @@ import yaml
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidSceneError
-from slap_ros.geometry.pose import Pose, Quaternion, Vector, from_yaw, multiply
+from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Object, State
-from slap_ros.robot.scene_config import SceneConfig, sampled_scene_config
-from slap_ros.robot.state_assembly import feature_values
+from slap_ros.robot.scene_config import SceneConfig, moving_name, opens, sampled_scene_config
+from slap_ros.robot.tag_places import SMALLEST_PLACED, tag_places
 from slap_ros.vision.tags import SHARE_OF_FACE, tag_frame, tag_of_frame
-from slap_ros.worlds.features import POSE_FEATURES, VELOCITY_FEATURES
+from slap_ros.worlds.contact.features import DRAWER_FEATURES
+from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
+from slap_ros.worlds.contact.scene import BoxPart, Part
+from slap_ros.worlds.contact.world import ContactWorld
+from slap_ros.worlds.features import POSE_FEATURES, VELOCITY_FEATURES, pose_of
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.scene import Box
 from slap_ros.worlds.joint_space.world import PandaWorld
 
+ROBOTS = (ROBOT, HAND_OF_FORCES)
 SMALLEST_TAG = 0.01  # m; smaller ones are not seen across a table
-SIZE_STEP = 0.0005  # m, of which sizes are multiples
 DECIMALS = 9  # of numbers in the file
 HALF_SIZES = ("half_x", "half_y", "half_z")  # features of a box
-UPRIGHT: Quaternion = (0.5, 0.5, 0.5, 0.5)  # of a tag on the face towards x, its y axis upwards
-UPSIDE_DOWN: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -42,14 +45,19 @@ class PlacedTag:
     Args:
         tag: Number of the tag.
         size: Edge of its black square, m.
-        obj: Object that it is on.
-        pose: Pose of the tag in the object's frame.
+        obj: Object that it is on; where that opens, the tag is on the part that does.
+        pose: Pose of the tag in the frame of the object, or of that part.
     """
 
     tag: int
     size: float
     obj: Object
     pose: Pose
+
+    @property
+    def body(self) -> str:
+        """The name of the body that it is on."""
+        return moving_name(self.obj)
 
 
 def placed_tags(config: SceneConfig) -> list[PlacedTag]:
@@ -94,7 +102,7 @@ def _fitting_size(template: State, obj: Object, frame: str, size: float | None) 
 
 
 def tagged_scene(domain: Domain, state: State) -> str:
-    """A scene file of a task, with a tag on each face of what can move.
+    """A scene file of a task, with tags on the flat faces of what can move.
 
     Args:
         domain: Domain with a Panda.
@@ -103,71 +111,66 @@ def tagged_scene(domain: Domain, state: State) -> str:
     Raises:
         InvalidSceneError: An object has no flat faces, or faces too small for a tag.
     """
-    boxes = _boxes(domain, state)
-    detected = sampled_scene_config(state).detected
+    parts, detected = _tagged_parts(domain, state), sampled_scene_config(state).detected
     numbers = iter(range(10**6))
     objects: dict[str, Any] = {}
     for obj in state.objects:
-        if obj.type == ROBOT:
+        if obj.type in ROBOTS:
             continue
-        where = (
-            _tag_entry(boxes, obj, numbers)
-            if obj in detected
-            else {"pose": [round(v, DECIMALS) for v in feature_values(state, obj, POSE_FEATURES)]}
-        )
-        objects[obj.name] = {"type": obj.type.name, **where, "features": _features(state, obj)}
+        entry: dict[str, Any] = {"type": obj.type.name}
+        if obj not in detected or opens(obj):
+            entry["pose"] = _numbers(pose_of(state, obj))
+        if obj in detected:
+            entry |= _tag_entry(parts.get(obj.name, ()), obj, numbers)
+        objects[obj.name] = {**entry, "features": _features(state, obj)}
     return yaml.safe_dump(
         {"objects": objects}, sort_keys=False, default_flow_style=None, width=1000
     )
 
 
-def _boxes(domain: Domain, state: State) -> Mapping[str, Box]:
-    world = domain.make_world(state)
-    if not isinstance(world, PandaWorld):
-        raise InvalidSceneError(
-            f"{domain.name} has no boxes around a Panda, and so no tags on their faces; the scene "
-            "file of a domain at a bench is written by hand"
-        )
-    with world:
-        return {body.name: body for body in world.scene.free if isinstance(body, Box)}
+def _tagged_parts(domain: Domain, state: State) -> Mapping[str, Sequence[Part]]:
+    """The parts of what can move, by name: of a drawer or a lid, those of the part that opens.
 
-
-def _tag_entry(boxes: Mapping[str, Box], obj: Object, numbers: Iterator[int]) -> dict[str, Any]:
-    if obj.name not in boxes:
-        raise InvalidSceneError(f"{obj.name} has no flat faces for tags: it is not a box")
-    half = boxes[obj.name].half_extents_m
-    size = SIZE_STEP * math.floor(2.0 * SHARE_OF_FACE * min(half) / SIZE_STEP + 1e-6)
-    if size < SMALLEST_TAG:
-        raise InvalidSceneError(
-            f"{obj.name} is too small for tags: its largest would be {1000.0 * size:.1f} mm"
-        )
-    frames = {
-        tag_frame(next(numbers)): [round(v, DECIMALS) + 0.0 for v in (*p.position, *p.quaternion)]
-        for p in (face.inverse() for face in face_poses(half))
-    }
-    return {"tag_size": round(size, DECIMALS), "frames": frames}
-
-
-def face_poses(half: Vector) -> tuple[Pose, ...]:
-    """The poses of tags in the middle of a box's faces: top, +x, +y, -x, -y, bottom.
-
-    Args:
-        half: Half the edges of the box, m.
+    Raises:
+        InvalidSceneError: The domain has no bodies around a Panda.
     """
-    x, y, z = half
-    sides = ((x, 0.0, 0.0), (0.0, y, 0.0), (-x, 0.0, 0.0), (0.0, -y, 0.0))
-    return (
-        Pose((0.0, 0.0, z)),
-        *(
-            Pose(middle, multiply(from_yaw(0.5 * math.pi * quarter), UPRIGHT))
-            for quarter, middle in enumerate(sides)
-        ),
-        Pose((0.0, 0.0, -z), UPSIDE_DOWN),
-    )
+    world = domain.make_world(state)
+    if isinstance(world, PandaWorld):
+        with world:
+            boxes = [body for body in world.scene.free if isinstance(body, Box)]
+            return {body.name: (BoxPart(body.half_extents_m),) for body in boxes}
+    if isinstance(world, ContactWorld):
+        with world:
+            free = {body.name: body.parts for body in world.scene.free}
+            return free | {body.name: body.moving for body in world.scene.jointed}
+    raise InvalidSceneError(f"{domain.name} has no bodies around a Panda, and so no tags on them")
+
+
+def _tag_entry(parts: Sequence[Part], obj: Object, numbers: Iterator[int]) -> dict[str, Any]:
+    """Size and frames of an object's tags, as a scene file has them.
+
+    Raises:
+        InvalidSceneError: It has no flat faces, or faces too small for tags.
+    """
+    if not parts:
+        raise InvalidSceneError(f"{obj.name} has no flat faces for tags: it is not a box")
+    places = tag_places(parts)
+    if not places.poses:
+        raise InvalidSceneError(
+            f"{obj.name} is too small for tags: its largest would be {1000.0 * places.size:.1f} mm "
+            f"on its flat faces, and a camera needs {1000.0 * SMALLEST_PLACED:.0f} mm"
+        )
+    frames = {tag_frame(next(numbers)): _numbers(pose.inverse()) for pose in places.poses}
+    return {"tag_size": round(places.size, DECIMALS), "frames": frames}
+
+
+def _numbers(pose: Pose) -> list[float]:
+    return [round(v, DECIMALS) + 0.0 for v in (*pose.position, *pose.quaternion)]
 
 
 def _features(state: State, obj: Object) -> dict[str, float]:
     """What a scene file states of an object: all but where it is and how it moves."""
-    moving = {"held", *(f.name for f in (*POSE_FEATURES, *VELOCITY_FEATURES))}
+    changing = (*POSE_FEATURES, *VELOCITY_FEATURES, *DRAWER_FEATURES)
+    moving = {"held", *(feature.name for feature in changing)}
     names = [feature.name for feature in obj.type.features if feature.name not in moving]
     return {name: round(float(state.get(obj, name)), DECIMALS) for name in names}

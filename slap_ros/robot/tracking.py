@@ -124,11 +124,22 @@ class Track:
         """The newest detection; there must be one."""
         return self._detections[-1]
 
-    def newest_motion(self) -> PoseEstimate | None:
-        """The pose and its motion from the last detections alone; None if they are too few."""
-        few = list(self._detections)[-self._settings.confirmations :]
+    def newest_motion(self, since_s: float = -math.inf) -> PoseEstimate | None:
+        """The pose and its motion from the last detections; None if they are too few since then.
+
+        They are all there is to know, unless a pose at rest was remembered: what does not explain
+        all of them has not moved as long as it explains one, for a tag that is about to be covered
+        seems to be elsewhere.
+
+        Args:
+            since_s: Time before which detections do not count, s.
+        """
+        few = [d for d in self._detections if d.stamp_s > since_s][-self._settings.confirmations :]
         if len(few) < self._settings.confirmations:
             return None
+        known = self._known
+        if known is not None and any(self._near(d.pose, known.pose, 1.0, d.eye) for d in few):
+            return known
         return _standing(few) if self._agree(few) else _moving(few)
 
     def estimate(self, since_s: float) -> PoseEstimate | None:

@@ -115,3 +115,19 @@ def test_a_launched_robot_at_a_bench_has_the_parameters_of_a_started_one():
         assert given.items() <= started[f"robot_bridge.{node}"].items()
     assert launched["servo_bridge"]["gripper_effort"] == HandModel().grip_n
     assert started["robot_bridge.servo"]["scene"] == "my.yaml"
+
+
+def test_a_launched_camera_at_a_bench_has_the_parameters_of_a_started_one():
+    chosen = DomainChoice("stack_at_target", "fair")
+    robot = {"camera": True}
+    settings = RunSettings(
+        chosen, 1, 0, "lazy", None, world="mujoco", servo=True, scene="my.yaml", mujoco=robot
+    )
+    launched, started = blocks("servo_camera.yaml"), node_parameters(settings)
+    nodes = {"servo_bridge": "servo", "mujoco_robot": "mujoco", "tag_detector": "tag_detector"}
+    assert set(launched) == set(nodes)
+    for name, node in nodes.items():
+        assert launched[name].items() <= started[f"robot_bridge.{node}"].items()
+    assert {started[f"robot_bridge.{node}"]["scene"] for node in ("mujoco", "tag_detector")} == {
+        "my.yaml"
+    }

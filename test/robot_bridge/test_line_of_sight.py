@@ -32,7 +32,8 @@ from slap_ros.robot.line_of_sight import Ways, across, is_slanted, mirrored
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import scene_config
 from slap_ros.robot.state_assembly import Grasp
-from slap_ros.robot.tagged_scene import face_poses, placed_tags, tagged_scene
+from slap_ros.robot.tag_places import face_poses
+from slap_ros.robot.tagged_scene import placed_tags, tagged_scene
 from slap_ros.robot.tracking import LONGEST, Detection, Track, TrackingSettings, still
 from slap_ros.vision.pinhole_camera import PinholeCamera, looking_at
 from slap_ros.vision.tags import tag_frame

@@ -186,7 +186,7 @@ def test_the_ensemble_opens_a_drawer_and_grasps_a_hammer_at_a_bench(network, tmp
     ("arguments", "code", "said"),
     [
         ([DOMAIN, "--scene", "my.yaml"], ErrorCode.INVALID_SCENE, "my.yaml cannot be read"),
-        ([DOMAIN, "--mujoco", "camera=true"], ErrorCode.INVALID_PARAMETER, "no camera"),
+        ([DOMAIN, "--mujoco", "camera=true"], ErrorCode.INVALID_PARAMETER, "camera needs tags"),
         ([DOMAIN, "--robot", "speed=0.1"], ErrorCode.INVALID_PARAMETER, "speed"),
         ([DOMAIN, "--mujoco", "stiffness=0"], ErrorCode.INVALID_PARAMETER, "stiffness"),
     ],

@@ -31,6 +31,7 @@ from slap_ros.vision.tags import CELLS, MARGIN, tag_image
 CAMERA = "camera"  # its name in the model
 CELL = 32  # pixels of a tag's cell in a texture
 PLATE = 1e-4  # m, half the thickness of a tag
+NEAREST = 0.15  # m, from the camera, of what is in the picture
 SAMPLES = 8  # of each pixel, against stairs along edges
 LIGHT = 0.5  # of what is white, from everywhere, and as much again from the camera
 OPENGL_CAMERA: Quaternion = (
@@ -126,7 +127,7 @@ def add_tags(spec: Any, tags: Sequence[PlacedTag]) -> None:
         texture.data = np.ascontiguousarray(picture).tobytes()
         material = spec.add_material(name=name, specular=0.0, shininess=0.0)
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
-        body = spec.body(tag.obj.name)
+        body = spec.body(tag.body)
         if body is None:
             raise InvalidSceneError(f"tag {tag.tag} is on {tag.obj.name}, which the task has not")
         _add_plate(body, name, tag)
@@ -158,6 +159,8 @@ class MujocoCamera:
 
     def __init__(self, model: Any) -> None:
         self._model, self._data = model, mujoco.MjData(model)
+        # A share of the scene's extent: with a floor of 80 m, what is within 1.1 m would lack.
+        model.vis.map.znear = min(model.vis.map.znear, NEAREST / model.stat.extent)
         width, height = (int(n) for n in model.cam_resolution[model.cam(CAMERA).id])
         self._view = mujoco.MjrRect(0, 0, width, height)
         self._context = _gl_context(width, height)

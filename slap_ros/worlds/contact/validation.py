@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -55,7 +55,10 @@ def require_possible(
 
 
 def require_possible_bodies(
-    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+    scene: ContactScene,
+    snapshot: ContactSnapshot,
+    placement: Placement,
+    unseen: Collection[str] = (),
 ) -> None:
     """Refuse bodies that cannot be as they were detected, wherever encoders have the hand.
 
@@ -66,6 +69,7 @@ def require_possible_bodies(
         scene: Bodies of the scene.
         snapshot: Physics of the state; all numbers are finite.
         placement: Poses of the bodies that do not move.
+        unseen: Names of bodies that are where they are assumed to be: these may be in others.
 
     Raises:
         InvalidStateError: Names the value that is wrong, and what would be right.
@@ -73,7 +77,8 @@ def require_possible_bodies(
     require_rotations(_poses(scene, snapshot, placement))
     _require_near_and_slow(scene, snapshot, placement)
     _require_openings(scene, snapshot)
-    _require_apart(scene, placement, _movable(scene, snapshot, placement))
+    movable = _movable(scene, snapshot, placement)
+    _require_apart(scene, placement, [one for one in movable if one[0] not in unseen])
 
 
 def _require_near_and_slow(

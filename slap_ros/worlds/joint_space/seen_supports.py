@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector, conjugate, rotate
-from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.settling import DISTANCE_ERROR, FLOATING, levelled
 
 SEEN_FLOATING = 0.024  # m, the same as FLOATING for what a camera sees; less than half a block
@@ -28,6 +28,18 @@ CONFLICT = 1.0  # m, more than all errors: of a body that stands on nothing, or 
 Option = tuple[Pose, float]  # a pose, and how much of an error it asks for, m
 
 
+class StandingBody(Protocol):
+    """A body that stands on what is below it."""
+
+    def at(self, pose: Pose) -> OrientedBox:
+        """The box around the body at a pose."""
+        ...
+
+    def stands_on(self, down: Vector) -> bool:
+        """Whether it stands on a plane without turning, with an axis of its own downwards."""
+        ...
+
+
 class SupportSearch:
     """Where bodies stand that were measured at rest, the lowest first.
 
@@ -38,7 +50,10 @@ class SupportSearch:
     """
 
     def __init__(
-        self, measured: Mapping[int, Pose], bodies: Sequence[Body], eyes: Mapping[int, Vector]
+        self,
+        measured: Mapping[int, Pose],
+        bodies: Sequence[StandingBody],
+        eyes: Mapping[int, Vector],
     ) -> None:
         self._measured, self._bodies, self._eyes = measured, bodies, eyes
         self._error = math.inf
@@ -87,7 +102,7 @@ def _down(pose: Pose) -> Vector:
     return (float(x), float(y), float(z))
 
 
-def _put_down(pose: Pose, body: Body, below: Sequence[OrientedBox]) -> Pose | None:
+def _put_down(pose: Pose, body: StandingBody, below: Sequence[OrientedBox]) -> Pose | None:
     """The pose on the highest top near the body's bottom, if there is one."""
     box = body.at(pose)  # whose middle need not be the body's origin
     near = [other.top for other in below if _is_over(box, other, min(box.half))]
@@ -99,7 +114,7 @@ def _put_down(pose: Pose, body: Body, below: Sequence[OrientedBox]) -> Pose | No
 
 
 def _in_sight(
-    pose: Pose, body: Body, below: Sequence[OrientedBox], eye: Vector
+    pose: Pose, body: StandingBody, below: Sequence[OrientedBox], eye: Vector
 ) -> Iterator[Option]:
     """The poses on what the body may stand on, if it was seen at a wrong distance."""
     bottom = body.at(pose).bottom

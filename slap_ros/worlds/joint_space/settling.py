@@ -14,13 +14,12 @@ from collections.abc import Mapping, Sequence
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
-from slap_ros.worlds.joint_space.scene import Body
-from slap_ros.worlds.joint_space.seen_supports import SupportSearch
+from slap_ros.worlds.joint_space.seen_supports import StandingBody, SupportSearch
 
 
 def resting_poses(
     measured: Mapping[int, Pose],
-    bodies: Sequence[Body],
+    bodies: Sequence[StandingBody],
     fixed: Sequence[OrientedBox],
     eyes: Mapping[int, Vector] | None = None,
 ) -> dict[int, Pose]:
