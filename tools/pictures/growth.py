@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 DATA = ROOT / "docs" / "images" / "growth.json"
 SIZE = (5.0, 3.2)  # inches
-TICKS_S = (0.25, 0.5, 1.0, 2.0, 4.0)
+TICKS_S = (0.06, 0.12, 0.25, 0.5, 1.0)
 
 
 def make(path: Path) -> None:
