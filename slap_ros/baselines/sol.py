@@ -9,6 +9,7 @@ are frozen. Its learner is PPO here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -17,7 +18,7 @@ import numpy as np
 from slap_ros.baselines.method import Method
 from slap_ros.baselines.ppo import PpoLearner, TaskPpoSettings
 from slap_ros.baselines.training_envs import TrainingEnvs, separate_envs
-from slap_ros.baselines.turns import TurnBuffer, TurnPolicy, TurnRewards
+from slap_ros.baselines.turns import SCORE_NOISE, TurnBuffer, TurnPolicy, TurnRewards
 from slap_ros.environments.option_task_env import LENGTHS
 from slap_ros.policies.mlp_policy import MlpPolicy
 
@@ -30,6 +31,7 @@ class SolLearner(PpoLearner):
     def __init__(self, settings: TaskPpoSettings, envs: TrainingEnvs, seed: int) -> None:
         """See :class:`~slap_ros.baselines.ppo.PpoLearner`."""
         made = TurnRewards(envs.make(), envs.durations, settings.gamma)
+        self._axes = envs.joint_axes
         (size,) = made.observation_space.shape or (0,)
         (actions,) = made.action_space.shape or (0,)
         turn = size - 1 - int(made.get_attr("option_count")[0])
@@ -45,8 +47,15 @@ class SolLearner(PpoLearner):
         )
 
     def policy(self) -> MlpPolicy:
-        """The most likely choices and motions, which are kept within (-1, 1)."""
-        return replace(super().policy(), squashed=True)
+        """The most likely choices and motions, kept within (-1, 1), and noise on both.
+
+        With it, others are chosen about as often as learned. Without it, an option that leads
+        nowhere is chosen for ever.
+        """
+        likely = super().policy()
+        noise = np.full(len(likely.log_std), math.log(SCORE_NOISE), np.float32)
+        noise[: self._axes] = likely.log_std[: self._axes]
+        return replace(likely, log_std=noise, squashed=True)
 
     def figures(self) -> Mapping[str, float]:
         """How often options act, as a share of the newest actions of all environments."""
@@ -73,5 +82,4 @@ METHOD = Method(
     {"ours": OURS, "paper": replace(OURS, total_steps=10_000_000)},
     SolLearner,
     separate_envs,
-    noisy=False,
 )

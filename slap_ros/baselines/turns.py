@@ -9,6 +9,7 @@ pass back through it gives the advantages of both.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
@@ -24,6 +25,8 @@ from torch.distributions import Categorical, Distribution, Normal
 from slap_ros.baselines.option_rollouts import Durations, OptionRolloutBuffer, SuccessRewards
 
 SHARPNESS = 5.0  # logarithm of how much likelier the best choice can be than an even one
+# Standard deviation of the Gumbel noise on scores by which choices have their probabilities.
+SCORE_NOISE = math.pi / math.sqrt(6.0) / SHARPNESS
 
 Floats = NDArray[np.float32]
 

@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """A controller and its options in one rollout: who is judged by what."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
 
+from slap_ros.baselines.sol import METHOD, SolLearner
+from slap_ros.baselines.training_envs import separate_envs
 from slap_ros.baselines.turns import TurnBuffer, Turns
 from slap_ros.environments.option_task_env import LENGTHS
 from slap_ros.environments.registration import make_task_env
@@ -63,6 +67,24 @@ def test_what_follows_a_skill_is_discounted_by_its_steps():
 def test_the_end_of_an_episode_is_the_end_of_its_option():
     found = filled(STEPS[:2], last_value=7.0, done=True)
     assert found == pytest.approx([-0.5, 0.2 - 0.3])
+
+
+def test_a_policy_in_numpy_chooses_about_as_often_as_it_has_learned():
+    env = make_task_env("obstacle2d", "paper", obs="options")
+    envs = separate_envs(lambda: env, 0, 1)
+    learner = SolLearner(replace(METHOD.settings["ours"], n_steps=8, batch_size=8), envs, seed=0)
+    net = learner._ppo.policy.action_net
+    first, end = env._axes, env.action_space.shape[0] - len(LENGTHS)
+    with torch.no_grad():
+        net.bias[first : first + 3] = torch.tensor([0.5, 0.3, -0.9])
+    observation, _ = env.reset(seed=0)
+    rows = np.repeat(observation[None], 20_000, axis=0)
+    scores = learner.policy().sample(rows, np.random.default_rng(0), 1.0)[:, first:end]
+    found = np.bincount(scores.argmax(-1), minlength=end - first) / len(rows)
+    _, (choice, _) = learner._ppo.policy._both(torch.as_tensor(observation[None]))
+    learned = choice.probs[0].detach().numpy()
+    assert learned.max() > 0.2
+    assert np.abs(found - learned).max() < 0.12  # its noise is Gaussian, with lighter tails
 
 
 # -- the environment ------------------------------------------------------------------------------
