@@ -78,7 +78,7 @@ def test_a_policy_in_numpy_chooses_about_as_often_as_it_has_learned():
     with torch.no_grad():
         net.bias[first : first + 3] = torch.tensor([0.5, 0.3, -0.9])
     observation, _ = env.reset(seed=0)
-    rows = np.repeat(observation[None], 20_000, axis=0)
+    rows = np.repeat(observation[None], 4_000, axis=0)
     scores = learner.policy().sample(rows, np.random.default_rng(0), 1.0)[:, first:end]
     found = np.bincount(scores.argmax(-1), minlength=end - first) / len(rows)
     _, (choice, _) = learner._ppo.policy._both(torch.as_tensor(observation[None]))
