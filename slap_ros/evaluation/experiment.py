@@ -61,17 +61,20 @@ class Experiment:
         """One of the tasks."""
         return task_with_goal(self.domain, seed, index, self.goal)
 
-    def without_repetitions(self) -> Experiment:
-        """The experiment without tasks that are equal to an earlier one, in state and goal."""
-        known: set[tuple[bytes, frozenset[GroundAtom]]] = set()
-        left_out = set(self.left_out)
+    def first_equals(self) -> dict[tuple[int, int], tuple[int, int]]:
+        """The first task that each one equals in state and goal, by seed and index."""
+        known: dict[tuple[bytes, frozenset[GroundAtom]], tuple[int, int]] = {}
+        found = {}
         for seed, index in self:
             task = self.task(seed, index)
             key = (task.initial_state.key, task.goal)
-            if key in known:
-                left_out.add((seed, index))
-            known.add(key)
-        return replace(self, left_out=frozenset(left_out))
+            found[seed, index] = known.setdefault(key, (seed, index))
+        return found
+
+    def without_repetitions(self) -> Experiment:
+        """The experiment without tasks that are equal to an earlier one, in state and goal."""
+        again = {task for task, first in self.first_equals().items() if task != first}
+        return replace(self, left_out=frozenset(self.left_out | again))
 
     def run(self, seed: int, index: int, approach: Approach = PURE_PLANNING) -> EpisodeResult:
         """Solve one task, in a world of its own.

@@ -4,10 +4,12 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
 from slap_ros.api.baselines import train_baseline
+from slap_ros.baselines.trained_baseline import load_baseline, save_baseline
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from support.slap_command import slap
@@ -50,6 +52,18 @@ def test_a_method_has_a_row_with_all_its_trainings(tmp_path, monkeypatch, traine
     assert len(data["baselines"]) == 3
     page = (tmp_path / "rivals_obstacle2d.md").read_text()
     assert "| `paper` | 3 × 2 | PPO | 0% " in page
+
+
+def test_a_policy_that_acts_with_noise_tries_equal_tasks_as_well(tmp_path, monkeypatch, trained):
+    in_this_process(monkeypatch)
+    noisy = replace(load_baseline(trained[1], get_domain("obstacle2d", "paper")), noise=1.0)
+    save_baseline(tmp_path / "obstacle2d-noisy", noisy)
+    given = ["--tasks", 4, "--seeds", 1, "--against", tmp_path / "obstacle2d-noisy"]
+    code, said = rivals("obstacle2d", "--output", tmp_path, *given)
+    assert code == 0, said
+    page = (tmp_path / "rivals_obstacle2d.md").read_text()
+    assert "| `paper` | 3 | pure planning | 100% " in page
+    assert "| `paper` | 4 × 1 | PPO | 0% " in page
 
 
 def test_without_a_baseline_there_is_nothing_to_compare(tmp_path, trained):

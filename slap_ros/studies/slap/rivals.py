@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
@@ -41,11 +41,12 @@ if TYPE_CHECKING:
 MEASURED = """\
 Each baseline acts in the tasks of the preset that it was trained on, until the goal holds or the
 domain's step limit is reached. It does not plan. Tasks, step limits and lengths are those of
-[Table 1](README.md). A task that equals an earlier one is left out; one with more objects than a
-policy has room for counts as failed. Success has Wilson's 95 % interval, and length is the mean
-over solved tasks with the sample standard deviation. Relative length is over tasks that pure
-planning solved too. Steps are environment steps of one training, and core-hours its time of one
-core, on a machine that did other work as well."""
+[Table 1](README.md). A task that equals an earlier one is left out, unless a policy acts with
+noise, which is drawn anew; one with more objects than a policy has room for counts as failed.
+Success has Wilson's 95 % interval, and length is the mean over solved tasks with the sample
+standard deviation. Relative length is over tasks that pure planning solved too. Steps are
+environment steps of one training, and core-hours its time of one core, on a machine that did other
+work as well."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def study(
     """
     rows: list[BaselineRow] = []
     for preset in dict.fromkeys(one.preset for one in baselines.values()):
-        experiment = Experiment(get_domain(domain, preset), *tasks).without_repetitions()
+        experiment = Experiment(get_domain(domain, preset), *tasks)
         own = {name: one for name, one in baselines.items() if one.preset == preset}
         rows += _rows(experiment, own, runner)
     return StudyReport(
@@ -105,17 +106,19 @@ def _rows(
     """The rows of one preset, pure planning first, then a row per method."""
     from slap_ros.baselines.trials import try_baseline
 
-    preset, tasks = experiment.domain.preset, named_tasks(experiment)
+    preset, distinct = experiment.domain.preset, experiment.without_repetitions()
     setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, PURE_PLANNING)
+    tasks = named_tasks(distinct)
     planned = {f"{preset}, planning: {name}": (setup, *task) for name, task in tasks.items()}
     pure = tuple(runner.run(f"{preset}, planning", solve_task, Trial.from_json, planned).values())
-    rows = [BaselineRow(Row.of(experiment, PURE_PLANNING.name, {"": pure}, pure), ())]
+    rows = [BaselineRow(Row.of(distinct, PURE_PLANNING.name, {"": pure}, pure), ())]
     for method in dict.fromkeys(one.name for one in baselines.values()):
         own = {name: one for name, one in baselines.items() if one.name == method}
+        tried = experiment if any(one.noise for one in own.values()) else distinct
         jobs = {
             folder: {
                 f"{preset}, {folder}, {one.digest}: {name}": (one, preset, None, *task)
-                for name, task in tasks.items()
+                for name, task in named_tasks(tried).items()
             }
             for folder, one in own.items()
         }
@@ -123,8 +126,18 @@ def _rows(
         found = runner.run(what, try_baseline, Trial.from_json, *jobs.values(), failure=not_solved)
         trials = {folder: tuple(found[name] for name in batch) for folder, batch in jobs.items()}
         trained = tuple({"name": name, **describe_baseline(one)} for name, one in own.items())
-        rows.append(BaselineRow(Row.of(experiment, method, trials, pure), trained))
+        planning = _repeated(pure, tried)
+        rows.append(BaselineRow(Row.of(tried, method, trials, planning), trained))
     return rows
+
+
+def _repeated(pure: Sequence[Trial], experiment: Experiment) -> tuple[Trial, ...]:
+    """Trials of planning for all tasks, of which it solved those that equal no earlier one."""
+    known = {(trial.seed, trial.index): trial for trial in pure}
+    return tuple(
+        replace(known[first], seed=seed, index=index)
+        for (seed, index), first in experiment.first_equals().items()
+    )
 
 
 COLUMNS = (
