@@ -268,7 +268,7 @@ def test_the_best_rival_solves_most_and_then_in_the_fewest_steps(tmp_path):
         said.append(said_of_2d.split("|")[-2].strip())
     steps = {name: row["plan_length"] for name, row in under_paper.items()}
     assert said[0] == f"PPO: 100%, {steps['ppo']['mean']:.1f} steps"
-    assert said[1] == f"hierarchical RL: 100%, {steps['hierarchical']['mean']:.1f} steps"
+    assert said[1] == f"SOL: 100%, {steps['sol']['mean']:.1f} steps"
 
 
 def test_the_table_of_the_front_page_wants_data_of_its_preset(tmp_path):
