@@ -24,9 +24,9 @@ from stable_baselines3.sac.policies import Actor, MultiInputPolicy
 from torch import nn
 from torch.nn import functional
 
+from slap_ros.baselines.scores import SHARPNESS
 from slap_ros.environments.controls import ChoiceSpace
 
-SHARPNESS = 5.0  # from scores between -1 and 1 to logarithms of probabilities
 CHOICE_ENTROPY = 0.5  # of choices that SAC aims at, as a share of that of random ones
 SMALLEST = 1e-6  # derivative of tanh
 

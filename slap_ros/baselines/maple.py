@@ -21,16 +21,15 @@ from stable_baselines3.common.buffers import DictReplayBuffer
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from slap_ros.baselines import sac
-from slap_ros.baselines.hybrid_sac import SHARPNESS, HybridSac
+from slap_ros.baselines.hybrid_sac import HybridSac
 from slap_ros.baselines.method import Method
 from slap_ros.baselines.sac import SacTaskLearner, StagedSacSettings
+from slap_ros.baselines.scores import SCORE_NOISE
 from slap_ros.baselines.training_envs import TrainingEnvs, separate_envs
 from slap_ros.environments.controls import PrimitiveControl
 from slap_ros.policies.mlp_policy import MlpPolicy
 
-# Standard deviations: of the Gumbel noise by which choices have their probabilities, and of numbers
-# with the entropy that SAC aims at, -1 each.
-SCORE_NOISE = math.pi / math.sqrt(6.0) / SHARPNESS
+# Standard deviation of numbers with the entropy that SAC aims at, -1 each.
 NUMBER_NOISE = math.exp(-1.0) / math.sqrt(2.0 * math.pi * math.e)
 NEWEST = 1_000  # actions of each environment, of which a share is taken
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from slap_ros.baselines.method import Method
 from slap_ros.baselines.ppo import PpoLearner, TaskPpoSettings
+from slap_ros.baselines.scores import SCORE_NOISE
 from slap_ros.baselines.training_envs import TrainingEnvs, separate_envs
-from slap_ros.baselines.turns import SCORE_NOISE, TurnBuffer, TurnPolicy, TurnRewards
+from slap_ros.baselines.turns import TurnBuffer, TurnPolicy, TurnRewards
 from slap_ros.environments.option_task_env import LENGTHS
 from slap_ros.policies.mlp_policy import MlpPolicy
 

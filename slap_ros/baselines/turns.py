@@ -9,7 +9,6 @@ pass back through it gives the advantages of both.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
@@ -23,10 +22,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch.distributions import Categorical, Distribution, Normal
 
 from slap_ros.baselines.option_rollouts import Durations, OptionRolloutBuffer, SuccessRewards
-
-SHARPNESS = 5.0  # logarithm of how much likelier the best choice can be than an even one
-# Standard deviation of the Gumbel noise on scores by which choices have their probabilities.
-SCORE_NOISE = math.pi / math.sqrt(6.0) / SHARPNESS
+from slap_ros.baselines.scores import SHARPNESS
 
 Floats = NDArray[np.float32]
 

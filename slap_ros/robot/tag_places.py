@@ -17,9 +17,7 @@ from slap_ros.geometry.pose import Pose, Quaternion, Vector, from_yaw, multiply,
 from slap_ros.vision.tags import SHARE_OF_FACE
 from slap_ros.worlds.contact.scene import INSCRIBED, BoxPart, Part
 
-SMALLEST_PLACED = (
-    0.015  # m; across a table, smaller ones seem to be centimetres from where they are
-)
+SMALLEST_PLACED = 0.015  # m; across a table, smaller ones seem to be centimetres off
 SIZE_STEP = 0.0005  # m, of which sizes are multiples
 MOST_IN_A_ROW = 4  # on a long face; the outermost, since hands grasp in the middle
 CLEARANCE = 0.001  # m, before a tag, within which nothing else of the body is
