@@ -7,13 +7,14 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psutil
 import pytest
 
 from slap_ros.bags import evaluate_bag
+from support import leftovers
 from support.process_state import handles_signals, wait_until
 
 LIBRARY = Path(__file__).parents[1] / "shortcuts" / "data" / "obstacle2d"
@@ -30,6 +31,7 @@ def started(*arguments, folder):
     command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
     process = subprocess.Popen(
         command, cwd=folder, text=True, start_new_session=True,
+        env=os.environ | {"PYTHONFAULTHANDLER": "1"},  # for a SIGABRT
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip
     try:
@@ -76,6 +78,19 @@ def ends_well(process, number, to_all):
     assert told.rstrip().splitlines()[-1] == word
     wait_until(lambda: not in_session(process.pid))
     return told
+
+
+def moves_on(process, condition):
+    """Wait, while it runs. Where nothing comes of it, all its processes say where they are."""
+    try:
+        wait_until(lambda: condition() or process.poll() is not None)
+    except AssertionError:
+        for pid in leftovers.marked(leftovers.TEST, os.environ[leftovers.TEST]):
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGABRT)
+        pytest.fail(process.stderr.read())
+    if not condition():
+        pytest.fail(process.stderr.read())
 
 
 def pytest_generate_tests(metafunc):
@@ -134,7 +149,7 @@ def test_a_run_closes_its_bag(network, tmp_path):
     with started(*arguments, folder=tmp_path) as process:
         recorded = tmp_path / "bag" / "bag_0.mcap"
         # It moves: the topic of commands is announced in the bag with the first of them.
-        wait_until(lambda: recorded.exists() and b"/slap/command" in recorded.read_bytes())
+        moves_on(process, lambda: recorded.exists() and b"/slap/command" in recorded.read_bytes())
         ends_well(process, signal.SIGTERM, to_all=False)
     found = evaluate_bag(tmp_path / "bag")
     assert found.damage is None
