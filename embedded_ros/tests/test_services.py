@@ -5,15 +5,22 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 import pytest
 import rclpy
 from example_interfaces.srv import AddTwoInts
+from rclpy._dds_qos import to_policies
 from rclpy.node import Node
+from rclpy.qos import qos_profile_services_default
+from rclpy.service import PREFIX_SIZE, REQUEST_HEADER
 from std_srvs.srv import Trigger
 
-from conftest import TIMEOUT_S, Process, complete, spin_until
+from conftest import TIMEOUT_S, Process, complete, spin_until, wait_until
+from embedded_ros.transport import names
+from embedded_ros.transport.endpoints import Sample
+from embedded_ros.types.cdr import HEADER, deserialize, serialize
 
 Run = Callable[..., Process]
 
@@ -48,6 +55,31 @@ def test_blocking_calls_work_from_another_thread(node: Node, run: Run) -> None:
     assert spin_until(node, lambda: bool(answers))
     caller.join()
     assert answers == [7]
+
+
+def test_a_client_whose_reader_is_discovered_late_is_answered(node: Node, run: Run) -> None:
+    run("adder")
+    participant, policies = node._participant, to_policies(qos_profile_services_default)
+    tag = participant._service_tag("clientid")
+    kind = AddTwoInts.Request.ros_type.removesuffix("_Request")
+    writer = participant.create_writer(
+        names.request_topic("/add"), f"{kind}_Request", policies, tag
+    )
+    assert wait_until(lambda: bool(writer.matched_handles()))
+    prefix = HEADER + REQUEST_HEADER.pack(7, 1)
+    writer.write(serialize(AddTwoInts.Request(a=2, b=3), prefix))
+    time.sleep(0.5)  # s; where nothing gets lost, it is some milliseconds
+    reader = participant.create_reader(names.reply_topic("/add"), f"{kind}_Response", policies, tag)
+    samples: list[Sample] = []
+
+    def answered() -> bool:
+        if (sample := reader.take()) is not None:
+            samples.append(sample)
+        return bool(samples)
+
+    assert wait_until(answered)
+    answer = deserialize(samples[0].data, AddTwoInts.Response.ros_type, PREFIX_SIZE)
+    assert answer.sum == 5
 
 
 def test_a_call_nobody_answers_times_out(node: Node) -> None:

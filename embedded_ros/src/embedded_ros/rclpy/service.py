@@ -28,8 +28,9 @@ SrvT = TypeVar("SrvT")
 # Who asks, and which of its requests: rmw_cyclonedds's header of requests and responses.
 REQUEST_HEADER = struct.Struct("=Qq")
 PREFIX_SIZE = HEADER_SIZE + REQUEST_HEADER.size
-# rmw_cyclonedds's own limit on waiting for a client that is not fully discovered.
-DISCOVERY_WAIT_S = 0.1
+# rmw_cyclonedds waits for a client that is not fully discovered for 0.1 s. That is less than one
+# lost packet takes, and then the client would wait for its response for ever.
+DISCOVERY_WAIT_S = 5.0
 DISCOVERY_POLL_S = 0.002
 
 
@@ -127,14 +128,19 @@ class Service(Entity, Generic[SrvT]):
         """Wait until the client's reader of responses is discovered: earlier ones get lost."""
         if publication_handle in self._known_clients:
             return
-        requester = self._reader.matched(publication_handle)
-        client_id = user_data.value(requester, "clientid") if requester is not None else None
         deadline = time.monotonic() + DISCOVERY_WAIT_S
-        while client_id is not None and not self._reads_responses(client_id):
+        while (client_id := self._client_id(publication_handle)) is not None:
+            if self._reads_responses(client_id):
+                self._known_clients.add(publication_handle)
+                return
             if time.monotonic() > deadline:
                 return
             time.sleep(DISCOVERY_POLL_S)
-        self._known_clients.add(publication_handle)
+
+    def _client_id(self, publication_handle: int) -> str | None:
+        """What ties a client's ends together; None for a client of no ROS, or that has gone."""
+        requester = self._reader.matched(publication_handle)
+        return user_data.value(requester, "clientid") if requester is not None else None
 
     def _reads_responses(self, client_id: str) -> bool:
         readers = (self._writer.matched(handle) for handle in self._writer.matched_handles())
