@@ -26,7 +26,7 @@ class SymbolicPlan:
     """A plan as it is printed.
 
     Args:
-        steps: Operators with their objects.
+        steps: Operators with their objects, each as in ``(drive truck depot shop)``.
         cost: What they cost; None where the problem asks for no least cost.
         is_cheapest: Whether it is proven that no plan has fewer operators or, where costs count,
             costs less.
@@ -42,7 +42,12 @@ class SymbolicPlan:
         if self.cost is None:
             return f"{count}, the fewest" if self.is_cheapest else count
         known = "the least" if self.is_cheapest else "not proven to be the least"
-        return f"{count}, cost {self.cost:g}, {known}"
+        return f"{count}, cost {self.cost:.15g}, {known}"
+
+    def lines(self) -> list[str]:
+        """The plan as planners of competitions write it and validators read it."""
+        cost, kind = (len(self.steps), "unit") if self.cost is None else (self.cost, "general")
+        return [*self.steps, f"; cost = {cost:.15g} ({kind} cost)"]
 
 
 def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, json: bool) -> None:
@@ -80,8 +85,8 @@ def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, 
         costs = {} if found.cost is None else {"cost": found.cost}
         print_json({"plan": list(found.steps)} | costs)
         return
-    for step in found.steps:
-        print_result(step)
+    for line in found.lines():
+        print_result(line)
     console.print(str(found))
 
 
