@@ -6,12 +6,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.left_out import warn_caller
 from slap_ros.bags.episode_arrays import EpisodeArrays, episode_arrays
 from slap_ros.bags.evaluate import read_runs
 from slap_ros.errors import InvalidParameterError
 
 
+@checks_arguments
 def load_bag(
     path: Path | str, episode: int | None = None, namespace: str | None = None
 ) -> EpisodeArrays:
