@@ -12,6 +12,7 @@ from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.files import read_bytes
 from slap_ros.planning.greedy import find_plan
+from slap_ros.relational.articles import counted
 from slap_ros.relational.pddl import PddlDomain, PddlProblem, parse_domain, parse_problem
 from slap_ros.relational.pddl.ground_task import GroundTask
 from slap_ros.relational.pddl.grounder import MAX_BINDINGS, ground_task
@@ -38,7 +39,7 @@ class SymbolicPlan:
 
     def __str__(self) -> str:
         """How many operators, and what they cost."""
-        count = f"{len(self.steps)} operators"
+        count = counted(len(self.steps), "operator")
         if self.cost is None:
             return f"{count}, the fewest" if self.is_cheapest else count
         known = "the least" if self.is_cheapest else "not proven to be the least"
@@ -159,5 +160,7 @@ def read_pddl(path: Path) -> str:
     """
     try:
         return decode(read_bytes(path))
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InvalidParameterError(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
         raise InvalidParameterError(f"cannot read {path}: {error}") from error

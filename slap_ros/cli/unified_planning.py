@@ -78,7 +78,8 @@ def _environment() -> Iterator[Environment]:
 
 
 def _require_engine(environment: Environment, engine: str) -> None:
-    found = sorted(environment.factory.engines)
+    factory = environment.factory
+    found = sorted(name for name in factory.engines if factory.engine(name).is_oneshot_planner())
     if engine not in found:
         raise InvalidParameterError(
             f"unified-planning has no engine {engine!r} here; there are {', '.join(found)}"

@@ -193,6 +193,15 @@ def test_the_other_definition_is_named(tmp_path: Path) -> None:
     assert "expected (define (domain NAME) ...), found a problem only" in result.stderr
 
 
+def test_what_cannot_be_read_is_named_once_and_what_is_missing_said(tmp_path: Path) -> None:
+    result = slap("plan", tmp_path / "nope.pddl")
+    assert result.exit_code == ErrorCode.INVALID_PARAMETER
+    assert result.stderr.endswith("nope.pddl: No such file or directory\n")
+    (tmp_path / "domain.pddl").write_text(SURVEY, encoding="utf-8")
+    result = slap("plan", tmp_path / "domain.pddl")
+    assert "found a domain only; give the problem's file after" in result.stderr
+
+
 def test_both_definitions_in_one_file(tmp_path: Path) -> None:
     file = tmp_path / "both.pddl"
     file.write_bytes("\n".join(PAIRS["survey"]).encode("utf-8-sig"))
@@ -280,7 +289,9 @@ def test_an_unknown_engine_is_named(tmp_path: Path) -> None:
     pytest.importorskip("unified_planning", reason="needs the extra 'up'")
     result = invoke(tmp_path, PAIRS["survey"], "plan", "--planner", "up:nobody")
     assert result.exit_code == ErrorCode.INVALID_PARAMETER
-    assert "no engine 'nobody'" in " ".join(result.stderr.split())
+    told = " ".join(result.stderr.split())
+    assert "no engine 'nobody'" in told
+    assert "validator" not in told  # that is no planner
 
 
 def test_without_the_extra_it_is_said_how_to_install_it(
