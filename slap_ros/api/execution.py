@@ -23,7 +23,7 @@ from slap_ros.report import BagReport, read_report
 from slap_ros.whole_numbers import require_whole
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run(ShownInNotebooks):
     """A task that was executed, solved or not.
 

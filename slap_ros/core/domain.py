@@ -74,7 +74,7 @@ class Execution:
             raise InvalidDomainError(f"control_period_s is {period!r}, expected seconds, above 0")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Domain(ShownInNotebooks):
     """A planning domain together with its world.
 
