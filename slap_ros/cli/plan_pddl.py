@@ -10,7 +10,7 @@ from pathlib import Path
 
 from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
-from slap_ros.files import read_bytes
+from slap_ros.files import read_bytes, reason_of
 from slap_ros.planning.greedy import find_plan
 from slap_ros.relational.articles import counted
 from slap_ros.relational.pddl import PddlDomain, PddlProblem, parse_domain, parse_problem
@@ -160,7 +160,5 @@ def read_pddl(path: Path) -> str:
     """
     try:
         return decode(read_bytes(path))
-    except OSError as error:
-        raise InvalidParameterError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InvalidParameterError(f"cannot read {path}: {error}") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidParameterError(f"cannot read {path}: {reason_of(error)}") from error
