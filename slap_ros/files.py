@@ -109,6 +109,11 @@ def require_writable_folder(path: Path) -> None:
     require_writable(path)
 
 
+def reason_of(error: Exception) -> str:
+    """Why a file cannot be read or written, without its name, which errors of Python begin with."""
+    return getattr(error, "strerror", None) or str(error)
+
+
 def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
     """The content of a regular file.
 

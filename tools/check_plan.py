@@ -6,8 +6,9 @@
 
 It shares no code with the planner. The files are read as nested lists, states are sets of atoms,
 and conditions are judged by recursion, straight from the text. A plan has a line for each operator,
-as ``slap plan`` prints it: ``drive(truck, depot, shop)``; or as competitions write it, maybe with
-its time and duration: ``0: (drive truck depot shop) [1]``. Comments begin with a semicolon.
+as ``slap plan`` and competitions write it: ``(drive truck depot shop)``; maybe with its time and
+duration: ``0: (drive truck depot shop) [1]``; or as ``slap plan`` wrote it before:
+``drive(truck, depot, shop)``. Comments begin with a semicolon.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any
 
 Atom = tuple[str, ...]
 Tree = Any  # a word, or a list of trees
-_PRINTED = re.compile(r"([^\s(]+)\((.*)\)")
+_EARLIER = re.compile(r"([^\s(]+)\((.*)\)")
 _COMPETITIONS = re.compile(r"(?:[\d.]+\s*:\s*)?\(\s*([^\s()]+)([^()]*)\)(?:\s*\[[\d.]+\])?")
 _WORDS = re.compile(r"\(|\)|:[^\s()?:]*|-(?=[a-z])|\?[^\s()?]+|[^\s()?]+")
 
@@ -204,7 +205,7 @@ def check(world: World, steps: list[tuple[str, list[str]]]) -> float:
                 raise InvalidPlanError(f"step {number}: {obj} cannot be {variable} of {name}")
         binding = {variable: obj for (variable, _), obj in zip(entries, objects, strict=True)}
         if not world.holds(action.get(":precondition", []), state, binding):
-            raise InvalidPlanError(f"step {number}: {name}({', '.join(objects)}) is not possible")
+            raise InvalidPlanError(f"step {number}: ({' '.join((name, *objects))}) is not possible")
         change = Change()
         world.change(action.get(":effect", []), state, binding, change)
         state = (state - change.deleted) | change.added
@@ -226,7 +227,7 @@ def read_steps(text: str) -> list[tuple[str, list[str]]]:
             continue
         if found := _COMPETITIONS.fullmatch(step):
             steps.append((found[1], found[2].split()))
-        elif found := _PRINTED.fullmatch(step):
+        elif found := _EARLIER.fullmatch(step):
             steps.append((found[1], found[2].replace(",", " ").split()))
         else:
             raise InvalidPlanError(f"line {number} is no step: {step}")
@@ -249,7 +250,7 @@ def main() -> int:
     except InvalidPlanError as error:
         sys.stdout.write(f"invalid: {error}\n")
         return 1
-    sys.stdout.write(f"valid: {len(steps)} steps, cost {cost:g}\n")
+    sys.stdout.write(f"valid: {len(steps)} steps, cost {cost:.15g}\n")
     return 0
 
 

@@ -27,4 +27,9 @@ app = cli.command_app(COMMANDS)
 def run() -> None:
     """Run the command that the command line states."""
     open_closed_streams()
-    app()
+    try:
+        app()
+    except OSError as error:  # commands handle their own: this is of help texts and the version
+        from slap_ros.cli.console import end_without_stdout  # not above: help needs none of it
+
+        end_without_stdout(error)

@@ -87,7 +87,12 @@ def run_task(options: RunOptions) -> int:
     say_default_seed(options.seed)
     with _bag(options) as bag:
         settings = replace(request.settings, record=bag)
-        metrics = _run(replace(request, settings=settings), options, keep_states)
+        try:
+            metrics = _run(replace(request, settings=settings), options, keep_states)
+        except KeyboardInterrupt:
+            if options.record is not None and options.record.exists():
+                _name_bag(options.record)
+            raise
         # Another run has taken the name meanwhile: the bag there is that one's.
         if metrics.error_code == ErrorCode.BAG_EXISTS:
             bag = None
@@ -373,4 +378,8 @@ def _conclude(metrics: RunMetrics, record: Path | None, json: bool) -> None:
         verdict = "not known whether solved" if metrics.success is None else "not solved"
         console.print(styled(verdict, "bold red", f": {metrics.error_msg}"))
     if record is not None:
-        console.print(f"bag: {record}")
+        _name_bag(record)
+
+
+def _name_bag(record: Path) -> None:
+    console.print(f"bag: {record}")

@@ -23,6 +23,7 @@ from slap_ros.acquisition.training.retrieval import SkillEncoder
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.api.acquisition_request import AcquisitionRequest
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.jobs import require_torch, some_workers
 from slap_ros.api.left_out import Tell, warn_caller
 from slap_ros.api.proposers import Proposers
@@ -86,6 +87,7 @@ class AcquisitionWatch:
     tell: Tell = warn_caller
 
 
+@checks_arguments
 def acquire(
     domain: Domain,
     folder: Path | str,

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.jobs import some_workers
 from slap_ros.api.left_out import warn_caller
 from slap_ros.api.library_descriptions import describe_skills
@@ -82,6 +83,7 @@ class TrialRow:
         )
 
 
+@checks_arguments
 def evaluate(
     domain: Domain,
     shortcuts: Shortcuts = "shipped",

@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import time_ns
 
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.planning import planner_for
 from slap_ros.api.video import write_video
 from slap_ros.bags.run_recording import record_run
@@ -22,7 +23,7 @@ from slap_ros.report import BagReport, read_report
 from slap_ros.whole_numbers import require_whole
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run(ShownInNotebooks):
     """A task that was executed, solved or not.
 
@@ -123,6 +124,7 @@ class Run(ShownInNotebooks):
             return read_report(self.bag(Path(folder) / f"{self.domain.name}-{self.task.seed}"))
 
 
+@checks_arguments
 def execute(
     domain: Domain,
     task: Task,

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from warnings import warn
 
@@ -11,5 +12,8 @@ Tell = Callable[[str], None]  # takes a sentence for people
 
 
 def warn_caller(text: str) -> None:
-    """Issue a Python warning."""
-    warn(text, stacklevel=3)
+    """Issue a Python warning, at the line that called something of slap_ros."""
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").startswith("slap_ros."):
+        level, frame = level + 1, frame.f_back
+    warn(text, stacklevel=level)

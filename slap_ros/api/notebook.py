@@ -18,10 +18,10 @@ from slap_ros.api.execution import Run
 from slap_ros.core import Display, Domain, PictureSize, Task
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.drawing.body_pictures import canvas_of, draw_bodies, viewpoint, visible
-from slap_ros.drawing.words import counted
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.relational import State
+from slap_ros.relational.articles import counted
 from slap_ros.report import BagReport, render
 from slap_ros.worlds.animation import Picture
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.left_out import Tell, warn_caller
 from slap_ros.core import Domain
 from slap_ros.domains import domain_names, preset_names
@@ -29,6 +30,7 @@ def domains() -> list[str]:
     return domain_names()
 
 
+@checks_arguments
 def make(
     name: str,
     preset: str | None = None,
@@ -82,7 +84,7 @@ def _with_settings(name: str, preset: str | None, settings: dict[str, SettingTex
 
 
 def _as_text(value: SettingText) -> str:
-    return "..".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    return "..".join(map(str, value)) if isinstance(value, tuple | list) else str(value)
 
 
 def _skills(skills: str | Path | None) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.left_out import Tell, warn_caller
 from slap_ros.api.shortcut_choice import SAMPLES, Shortcuts, choose_library, sampling
 from slap_ros.core import Domain, Task
@@ -17,6 +18,7 @@ from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.relational import State
 
 
+@checks_arguments
 def plan(
     domain: Domain,
     task: Task,

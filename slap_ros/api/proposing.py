@@ -8,10 +8,12 @@ from slap_ros.acquisition.proposals.attempt_log import AttemptLog
 from slap_ros.acquisition.proposals.inquiry import Inquiry
 from slap_ros.acquisition.proposals.proposal import Proposal
 from slap_ros.acquisition.proposals.proposal_request import ProposalRequest
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.proposers import Proposers
 from slap_ros.core import Domain, Task
 
 
+@checks_arguments
 def propose(
     domain: Domain,
     task: Task,

@@ -6,12 +6,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.left_out import warn_caller
 from slap_ros.bags.episode_arrays import EpisodeArrays, episode_arrays
 from slap_ros.bags.evaluate import read_runs
 from slap_ros.errors import InvalidParameterError
+from slap_ros.relational.articles import counted
 
 
+@checks_arguments
 def load_bag(
     path: Path | str, episode: int | None = None, namespace: str | None = None
 ) -> EpisodeArrays:
@@ -44,7 +47,6 @@ def load_bag(
     if episode is None and len(episodes) > 1:
         raise InvalidParameterError(f"{path} has {len(episodes)} episodes: say which, from 0")
     if not 0 <= (episode or 0) < len(episodes):
-        raise InvalidParameterError(
-            f"{path} has {len(episodes)} episodes, and no episode {episode}"
-        )
+        there = counted(len(episodes), "episode")
+        raise InvalidParameterError(f"{path} has {there}, and no episode {episode}")
     return episodes[episode or 0]

@@ -11,6 +11,7 @@ from os.path import relpath
 from pathlib import Path
 from typing import Any
 
+from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.jobs import require_torch, some_workers
 from slap_ros.api.library_descriptions import describe_skills
 from slap_ros.api.setting_texts import Changes, change_texts
@@ -53,6 +54,7 @@ class Unwatched:
         """See :class:`~slap_ros.shortcuts.training_callback.TrainingCallback`."""
 
 
+@checks_arguments
 def train(
     domain: Domain,
     folder: Path | str,
@@ -146,6 +148,8 @@ def chosen_settings(
     """
     chosen = training_settings(name, domain)
     parsed = parse_changes(change_texts(changes), TrainingSettings)
+    if steps is not None:
+        require_whole("steps", steps, least=1)
     if steps is not None and (both := [n for n in parsed if n.endswith("total_steps")]):
         raise InvalidParameterError(f"--steps and --set {both[0]} say the same: give one")
     chosen = changed(chosen, parsed)

@@ -70,7 +70,11 @@ class TrainedBaseline:
 
     @property
     def digest(self) -> str:
-        """A hash of what was learned, 16 hexadecimal digits."""
+        """A hash of the policy's tensors, 16 hexadecimal digits.
+
+        How they are run (the activation, whether actions are squashed) is the method's, and not in
+        it: published results name SAC's and SOL's policies by this hash.
+        """
         return sha256(save(policy_tensors(self.policy))).hexdigest()[:16]
 
     @property

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec
 
 import typer
 
-from slap_ros.cli.streams import Stdout
+from slap_ros.cli.streams import Stdout, discard, stdout_complaint
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.redaction import without_secrets
 from slap_ros.signals import TerminatedError, exit_code, forget_interrupt, signals_raised
@@ -137,6 +137,13 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
     return run
 
 
+def end_without_stdout(error: OSError) -> NoReturn:
+    """End the process where stdout takes no help text, which no command writes."""
+    discard(sys.stdout)
+    _say(styled("error", "bold red", f" {stdout_complaint(error)}"))
+    sys.exit(int(ErrorCode.INPUT_OUTPUT))
+
+
 def _fail(code: ErrorCode, message: str, error: BaseException) -> NoReturn:
     _say(styled("error", "bold red", f" {without_secrets(message)}"))
     raise typer.Exit(int(code)) from error
@@ -147,14 +154,14 @@ def _say(text: str | Text) -> None:
     try:
         console.print(text)
     except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
+        discard(sys.stderr)
 
 
 def _os_complaint(error: OSError) -> str:
     what = error.strerror or str(error)
     path = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else ""
     where = path if len(path) <= 120 else f"{path[:100]}… ({len(path)} characters)"
-    return f"{what}: {where}; check the path, and the disk" if path else f"{what} (stdout?)"
+    return f"{what}: {where}; check the path, and the disk" if path else what
 
 
 def _unforeseen(error: Exception) -> tuple[ErrorCode, str]:

@@ -34,6 +34,7 @@ from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Summary, format_spread
 from slap_ros.files import require_writable
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
+from slap_ros.relational.articles import counted
 from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
@@ -176,7 +177,8 @@ def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
         "steps in shortcuts",
         title=(
             f"{experiment.domain.name}, preset {experiment.domain.preset}: "
-            f"{experiment.seeds} seeds from {experiment.first_seed} × {experiment.tasks} tasks"
+            f"{counted(experiment.seeds, 'seed')} from {experiment.first_seed} × "
+            f"{counted(experiment.tasks, 'task')}"
         ),
     )
     for summary in summaries:

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from slap_ros.cli.console import console, print_json, print_result
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
-from slap_ros.files import read_bytes
+from slap_ros.files import read_bytes, reason_of
 from slap_ros.planning.greedy import find_plan
+from slap_ros.relational.articles import counted
 from slap_ros.relational.pddl import PddlDomain, PddlProblem, parse_domain, parse_problem
 from slap_ros.relational.pddl.ground_task import GroundTask
 from slap_ros.relational.pddl.grounder import MAX_BINDINGS, ground_task
@@ -26,7 +27,7 @@ class SymbolicPlan:
     """A plan as it is printed.
 
     Args:
-        steps: Operators with their objects.
+        steps: Operators with their objects, each as in ``(drive truck depot shop)``.
         cost: What they cost; None where the problem asks for no least cost.
         is_cheapest: Whether it is proven that no plan has fewer operators or, where costs count,
             costs less.
@@ -38,11 +39,16 @@ class SymbolicPlan:
 
     def __str__(self) -> str:
         """How many operators, and what they cost."""
-        count = f"{len(self.steps)} operators"
+        count = counted(len(self.steps), "operator")
         if self.cost is None:
             return f"{count}, the fewest" if self.is_cheapest else count
         known = "the least" if self.is_cheapest else "not proven to be the least"
-        return f"{count}, cost {self.cost:g}, {known}"
+        return f"{count}, cost {self.cost:.15g}, {known}"
+
+    def lines(self) -> list[str]:
+        """The plan as planners of competitions write it and validators read it."""
+        cost, kind = (len(self.steps), "unit") if self.cost is None else (self.cost, "general")
+        return [*self.steps, f"; cost = {cost:.15g} ({kind} cost)"]
 
 
 def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, json: bool) -> None:
@@ -80,8 +86,8 @@ def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, 
         costs = {} if found.cost is None else {"cost": found.cost}
         print_json({"plan": list(found.steps)} | costs)
         return
-    for step in found.steps:
-        print_result(step)
+    for line in found.lines():
+        print_result(line)
     console.print(str(found))
 
 
@@ -155,4 +161,4 @@ def read_pddl(path: Path) -> str:
     try:
         return decode(read_bytes(path))
     except (OSError, UnicodeDecodeError) as error:
-        raise InvalidParameterError(f"cannot read {path}: {error}") from error
+        raise InvalidParameterError(f"cannot read {path}: {reason_of(error)}") from error

@@ -19,6 +19,7 @@ from slap_ros.planning.plan import PlanningResult, bound_as_text
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.symbolic_planner import plan_symbolically
 from slap_ros.relational import AtomSpace, LiftedOperator, ground_operators
+from slap_ros.relational.articles import counted
 from slap_ros.relational.pddl import with_different_objects, write_domain, write_problem
 from slap_ros.versions import versions
 
@@ -97,8 +98,8 @@ def _plan_by_hand(
         for name in names:
             print_result(name)
         console.print(
-            f"{len(names)} operators, the fewest; they are the domain's hand-written ones, as "
-            f"{domain.name} has no skills yet: steps are not predicted"
+            f"{counted(len(names), 'operator')}, the fewest; they are the domain's hand-written "
+            f"ones, as {domain.name} has no skills yet: steps are not predicted"
         )
     if output is not None:
         _write(output, _pddl(domain, operators, task))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -27,10 +28,14 @@ class Stdout:
         """Write a line of data, at once.
 
         Raises:
-            OSError: It cannot be written.
+            OSError: It cannot be written; the error says that it is stdout, and why.
         """
-        self.stream.write(f"{line}\n")
-        self.stream.flush()
+        try:
+            self.stream.write(f"{line}\n")
+            self.stream.flush()
+        except OSError as error:
+            discard(self.stream)
+            raise OSError(error.errno, stdout_complaint(error)) from error
 
     @contextmanager
     def kept_for_data(self) -> Iterator[None]:
@@ -80,13 +85,26 @@ def _descriptor(stream: TextIO) -> int | None:
         return None
 
 
+def discard(stream: TextIO) -> None:
+    """Let what a stream still has to write go nowhere."""
+    if (number := _descriptor(stream)) is not None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+
+
+def stdout_complaint(error: OSError) -> str:
+    """Why stdout takes nothing, in words."""
+    if error.errno == errno.EBADF:  # see open_closed_streams
+        return "stdout is closed"
+    return f"cannot write to stdout: {error.strerror}"
+
+
 def open_closed_streams() -> None:
     """Give a process that was started without stdout or stderr something in their place.
 
     Python has None there, which every library trips over. What is written to a closed stdout
-    fails as on a full disk; what is said to a closed stderr is for nobody.
+    fails as on any closed descriptor; what is said to a closed stderr is for nobody.
     """
     if sys.stdout is None:
-        sys.stdout = os.fdopen(os.open("/dev/full", os.O_WRONLY), "w", encoding="utf-8")
+        sys.stdout = os.fdopen(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")
     if sys.stderr is None:
         sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")

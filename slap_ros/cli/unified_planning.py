@@ -54,7 +54,7 @@ def plan_with_engine(domain: str, problem: str, engine: str) -> SymbolicPlan:
                 f"unified-planning's {engine} found a plan that is no sequence of operators, as of "
                 "durative actions; that is not read here"
             )
-        steps = tuple(map(str, result.plan.actions))
+        steps = tuple(map(_as_step, result.plan.actions))
         return SymbolicPlan(steps, _cost(task, result.plan), status == "SOLVED_OPTIMALLY")
 
 
@@ -78,7 +78,8 @@ def _environment() -> Iterator[Environment]:
 
 
 def _require_engine(environment: Environment, engine: str) -> None:
-    found = sorted(environment.factory.engines)
+    factory = environment.factory
+    found = sorted(name for name in factory.engines if factory.engine(name).is_oneshot_planner())
     if engine not in found:
         raise InvalidParameterError(
             f"unified-planning has no engine {engine!r} here; there are {', '.join(found)}"
@@ -91,6 +92,11 @@ def _read(environment: Environment, domain: str, problem: str) -> Any:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Name .* already defined")
         return PDDLReader(environment).parse_problem_string(domain, problem)
+
+
+def _as_step(action: Any) -> str:
+    """An operator and its objects, as plans list them: ``(drive truck depot shop)``."""
+    return f"({' '.join((action.action.name, *map(str, action.actual_parameters)))})"
 
 
 def _cost(task: Any, plan: Any) -> float | None:

@@ -74,7 +74,7 @@ class Execution:
             raise InvalidDomainError(f"control_period_s is {period!r}, expected seconds, above 0")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Domain(ShownInNotebooks):
     """A planning domain together with its world.
 
@@ -296,8 +296,11 @@ class Domain(ShownInNotebooks):
         if goal is None:
             return self._drawn(rng)
         if goal not in self.goals:
-            named = ", ".join(self.goals) or "none with a name, only atoms, such as (Near a b)"
-            raise UnknownGoalError(f"domain {self.name} has no goal {goal!r}; there are {named}")
+            named = ", ".join(self.goals) or "none with a name"
+            raise UnknownGoalError(
+                f"domain {self.name} has no goal {goal!r}; there are {named}; or give atoms, "
+                f"(PREDICATE OBJECT ...), of what `slap domains {self.name}` lists"
+            )
         for _ in range(MOST_DRAWN - 1):
             with suppress(UnknownObjectError):
                 return self._posed(self._drawn(rng), goal)

@@ -12,7 +12,7 @@ from slap_ros.relational import GroundAtom, State
 UNSAMPLED = -1  # seed of a task that was given or measured, not sampled
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Task(ShownInNotebooks):
     """Where to start, what to reach, and in how many environment steps.
 

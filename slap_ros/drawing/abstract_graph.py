@@ -13,10 +13,11 @@ from slap_ros.drawing.layout import EdgeLink, GraphLayout, NodeBox, Route, lay_o
 from slap_ros.drawing.palette import BACKGROUND, PENS
 from slap_ros.drawing.selection import Selection, ShownEdge, select
 from slap_ros.drawing.svg import SvgCurve, SvgGroup, SvgPicture, SvgShape
-from slap_ros.drawing.words import AtomNaming, counted
+from slap_ros.drawing.words import AtomNaming
 from slap_ros.planning.abstract_graph import AbstractGraph
 from slap_ros.planning.plan import Plan
 from slap_ros.relational import AtomSpace
+from slap_ros.relational.articles import counted
 
 MANY_NODES = 64  # with more, cards are small and only the plan's edges have labels
 MIN_WIDTH_PX = 560.0  # room for the title and the legend

@@ -12,10 +12,11 @@ from slap_ros.drawing.layout import Area, RoutePoint
 from slap_ros.drawing.palette import CARD, GOAL, INK, MUTED, PENS
 from slap_ros.drawing.selection import Selection
 from slap_ros.drawing.svg import SvgCurve, SvgShape, SvgText
-from slap_ros.drawing.words import ADDED, REMOVED, AtomNaming, counted
+from slap_ros.drawing.words import ADDED, REMOVED, AtomNaming
 from slap_ros.planning.abstract_graph import AbstractGraph
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan
+from slap_ros.relational.articles import counted
 
 PAGE_MARGIN_PX = 24.0
 TITLE_PX, FACT_PX, LEGEND_PX = 18.0, 12.5, 11.0  # font sizes

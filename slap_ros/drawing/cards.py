@@ -26,7 +26,8 @@ from slap_ros.drawing.palette import (
 )
 from slap_ros.drawing.selection import Selection, ShownEdge, ShownNode
 from slap_ros.drawing.svg import SvgRectangle, SvgShape, SvgText
-from slap_ros.drawing.words import ADDED, REMOVED, AtomNaming, counted
+from slap_ros.drawing.words import ADDED, REMOVED, AtomNaming
+from slap_ros.relational.articles import counted
 
 
 @dataclass(frozen=True)

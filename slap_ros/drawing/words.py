@@ -57,8 +57,3 @@ class AtomNaming:
 def _kind(type_: Type) -> str:
     """The topmost type: what takes a ``surface`` may take a table, even the only table."""
     return type_.name if type_.parent is None else _kind(type_.parent)
-
-
-def counted(number: int, noun: str) -> str:
-    """A number with its noun, in the plural unless the number is 1."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

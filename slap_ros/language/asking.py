@@ -16,7 +16,7 @@ from tempfile import mkdtemp
 from typing import Protocol, TextIO
 
 from slap_ros.errors import InvalidParameterError, LanguageUnavailableError
-from slap_ros.files import read_bytes, write_whole
+from slap_ros.files import read_bytes, reason_of, write_whole
 from slap_ros.language.client import CHARACTERS_PER_TOKEN  # nobody counts here
 from slap_ros.language.clipboard import copy_to_clipboard
 from slap_ros.language.request import OutputDegree, Reply, Request, replace_unprintable
@@ -120,7 +120,7 @@ class FolderChannel:
                 )
             write_whole(path, question)
         except (OSError, UnicodeDecodeError) as error:
-            raise InvalidParameterError(f"cannot write {path}: {error}") from error
+            raise InvalidParameterError(f"cannot write {path}: {reason_of(error)}") from error
 
 
 class TerminalChannel:
@@ -176,7 +176,7 @@ class TerminalChannel:
         try:
             return read_bytes(path, MAX_ANSWER_BYTES).decode("utf-8", "replace")
         except OSError as error:
-            self._tell(f"cannot read {path}: {error}")
+            self._tell(f"cannot read {path}: {reason_of(error)}")
             return None
 
 
@@ -213,7 +213,7 @@ def _whole_text(path: Path) -> str:
         try:
             content = read_bytes(path, MAX_ANSWER_BYTES) if path.exists() else b""
         except OSError as error:
-            raise LanguageUnavailableError(f"cannot read {path}: {error}") from error
+            raise LanguageUnavailableError(f"cannot read {path}: {reason_of(error)}") from error
         if content.strip() and content == before:
             return content.decode("utf-8", "replace")
         before = content

@@ -24,7 +24,7 @@ from slap_ros.errors import (
     LanguageOffError,
     StorageFullError,
 )
-from slap_ros.files import parse_json, read_bytes
+from slap_ros.files import parse_json, read_bytes, reason_of
 from slap_ros.language.asking import AskingClient
 from slap_ros.language.client import OpenAIClient
 from slap_ros.language.local import LocalClient
@@ -243,7 +243,7 @@ def read_cassette(path: Path) -> Cassette:
         data = read_bytes(path)
         lines = data.decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InvalidCassetteError(f"cannot read cassette {path}: {error}") from error
+        raise InvalidCassetteError(f"cannot read cassette {path}: {reason_of(error)}") from error
     header = _read_line(path, 1, lines[0]) if lines else {}
     if header.get("format") != FORMAT:
         raise InvalidCassetteError(f"{path} is no recording of a language model")

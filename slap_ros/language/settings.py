@@ -13,7 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import parse_json, read_text
+from slap_ros.files import parse_json, read_text, reason_of
 from slap_ros.language.request import JsonObject, OutputDegree
 
 OPENAI_URL = "https://api.openai.com/v1"
@@ -130,7 +130,9 @@ def _read_file(path: Path) -> LanguageSettings:
     try:
         data = parse_json(read_text(path))
     except (OSError, ValueError) as error:
-        raise InvalidParameterError(f"cannot read language settings {path}: {error}") from error
+        raise InvalidParameterError(
+            f"cannot read language settings {path}: {reason_of(error)}"
+        ) from error
     if not isinstance(data, dict):
         raise InvalidParameterError(f"{path}: expected a JSON object of language settings")
     _check_fields(path, data, LanguageSettings)

@@ -12,6 +12,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass, replace
+from difflib import get_close_matches
 from types import NoneType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -167,7 +168,11 @@ def _current_name(given: str, kind: type) -> str:
 
 def _require_known(name: str, known: Mapping[str, Any]) -> None:
     if name not in known:
-        raise InvalidParameterError(f"unknown setting {name!r}; there are {', '.join(known)}")
+        near = get_close_matches(name, known, n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        raise InvalidParameterError(
+            f"unknown setting {name!r}; {meant}there are {', '.join(known)}"
+        )
 
 
 def _with(settings: Any, path: Sequence[str], value: SettingValue) -> Any:

@@ -26,7 +26,7 @@ class Edge:
     option: Option
 
 
-@dataclass
+@dataclass(repr=False)
 class AbstractGraph(ShownInNotebooks):
     """Abstract states in order of discovery, and the options between them.
 

@@ -75,7 +75,7 @@ class PlanOrigin:
     samples: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PlanningResult(ShownInNotebooks):
     """A plan and the effort of finding it.
 

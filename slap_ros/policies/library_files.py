@@ -267,6 +267,8 @@ def read_about(path: Path, member: str, version: int, maker: str, remedy: str) -
     """
     if not path.is_dir():
         raise InvalidLibraryError(f"{path}: no such folder; `{maker}` makes one")
+    if not (path / ABOUT).exists():
+        raise InvalidLibraryError(f"{path}: no library, as it has no {ABOUT}; `{maker}` makes one")
     about = read_object(path / ABOUT)
     found = {kind for kind in KINDS if any(path.glob(f"*/{kind}"))}
     if found and member not in found:

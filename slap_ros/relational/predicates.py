@@ -175,3 +175,5 @@ class GroundAtom:
 
     def __str__(self) -> str:
         return f"{self.predicate.name}({', '.join(obj.name for obj in self.objects)})"
+
+    __repr__ = __str__  # a goal is a set of atoms, which shows them so

@@ -84,7 +84,7 @@ class RunReport:
         return tuple(chain for chain in self.chains if chain.improves)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BagReport(ShownInNotebooks):
     """Everything that a page shows of one bag."""
 

@@ -21,10 +21,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import slap_ros
 from slap_ros.drawing.svg import clean_value
-from slap_ros.drawing.words import counted
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.evaluation.metrics import known
 from slap_ros.files import require_writable, write_whole
+from slap_ros.relational.articles import counted
 from slap_ros.report.animation import Drawing, draw
 from slap_ros.report.content import PURE_PLANNING, BagReport, RunReport
 

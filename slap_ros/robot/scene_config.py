@@ -42,7 +42,7 @@ from typing import Any
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidMeasurementError, InvalidSceneError, InvalidStateError
-from slap_ros.files import parse_yaml, read_text
+from slap_ros.files import parse_yaml, read_text, reason_of
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.relational import Object, State
 from slap_ros.robot.tracking import measured_pose
@@ -154,7 +154,7 @@ def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
     try:
         content = parse_yaml(read_text(path, MAX_SCENE_BYTES))
     except (OSError, ValueError) as error:
-        raise InvalidSceneError(f"scene file {path} cannot be read: {error}") from error
+        raise InvalidSceneError(f"scene file {path} cannot be read: {reason_of(error)}") from error
     return scene_config(content, str(path), domain)
 
 

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from slap_ros.learning.progress_callback import ProgressCallback
 from slap_ros.shortcuts.candidate_groups import CandidateGroup
 
 
+@runtime_checkable
 class TrainingCallback(ProgressCallback, Protocol):
     """Receives the events of a training."""
 

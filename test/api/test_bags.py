@@ -140,6 +140,15 @@ def test_what_is_no_bag_is_refused(tmp_path, bag):
         slap_ros.load_bag(bag, episode=2)
 
 
+def test_a_warning_names_the_line_that_called(tmp_path, bag):
+    (whole,) = bag.glob("*.mcap")
+    cut = tmp_path / whole.name
+    cut.write_bytes(whole.read_bytes()[:-200])
+    with pytest.warns(UserWarning, match="is damaged") as told:
+        slap_ros.load_bag(cut)
+    assert [warning.filename for warning in told] == [__file__]
+
+
 def test_a_video_is_written(run, tmp_path):
     path = run.video(tmp_path / "run.gif", size=(160, 120))
     assert path.read_bytes()[:3] == b"GIF"

@@ -83,6 +83,12 @@ def test_domains_and_tasks_say_what_they_are(domain, task):
     assert all(str(atom) in said for atom in task.goal)
 
 
+def test_pythons_prompt_shows_what_print_shows(domain, task, plan, run):
+    for shown in (domain, task, plan, plan.graph, run):
+        assert repr(shown) == f"<{type(shown).__name__}: {shown}>"
+    assert repr(task.goal) == "frozenset({On(block1, target)})"
+
+
 def test_a_report_is_its_own_page(run):
     (page,) = Balanced(shown(run.report())["text/html"]).sources
     assert page.startswith("<!DOCTYPE html>") or "<html" in page

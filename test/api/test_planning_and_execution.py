@@ -161,6 +161,38 @@ def test_numbers_that_cannot_be_are_refused_before_anything_is_done(domain, tmp_
     assert not list(tmp_path.iterdir())
 
 
+WRONG_KINDS = {
+    'slap_ros.evaluate("obstacle2d")': "domain must be a Domain such as slap_ros.make(",
+    "slap_ros.plan(task, domain)": "domain must be a Domain such as",
+    "slap_ros.plan(domain, 1)": "task must be a Task such as domain.task(seed=1), not 1",
+    "slap_ros.plan(domain, task, planner=None)": "planner must be a text, not None",
+    "slap_ros.execute(domain, plan)": "such as domain.task(seed=1), not a PlanningResult",
+    "slap_ros.execute(domain, task, [plan])": "slap_ros.plan(domain, task), a Plan or None,",
+    "slap_ros.train(domain, None)": "folder must be a path or a text, not None",
+    'slap_ros.train(domain, folder, changes="a=1")': "a mapping or a list (each a text), not 'a=1'",
+    "slap_ros.train(domain, folder, callback=print)": "callback must be a TrainingCallback or None",
+    "slap_ros.train(domain, folder, steps=-1)": "steps must be at least 1, not -1",
+    "slap_ros.acquire(domain, folder, begin_with=[3])": "a path or a text), not a list",
+    "slap_ros.acquire(domain, folder, watch=3)": "watch must be an AcquisitionWatch, not 3",
+    "slap_ros.load_bag(3)": "path must be a path or a text, not 3",
+    "slap_ros.make(domain)": "name must be a text, not a Domain",
+    'slap_ros.propose("obstacle2d", task)': "not 'obstacle2d'",
+}
+
+
+@pytest.mark.parametrize("call", WRONG_KINDS)
+def test_arguments_of_wrong_kinds_are_refused(domain, task, plan, tmp_path, call):
+    given = {"domain": domain, "task": task, "plan": plan, "folder": tmp_path / "library"}
+    with pytest.raises(InvalidParameterError, match=re.escape(WRONG_KINDS[call])):
+        eval(call, {"slap_ros": slap_ros} | given)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_argument_that_is_missing_is_pythons_own_error(domain):
+    with pytest.raises(TypeError, match=r"plan\(\) missing 1 required positional argument: 'task'"):
+        slap_ros.plan(domain)
+
+
 def test_a_folder_to_begin_with_may_be_given_alone(tmp_path):
     bench = slap_ros.make("stack_at_target")
     with pytest.raises(InvalidLibraryError, match="no/library: no such folder"):

@@ -181,6 +181,8 @@ def test_plan_writes_pddl_that_it_can_plan_for_and_a_picture(tmp_path):
             "the goal holds in none",
         ),
         (["evaluate", "obstacle2d", "--shortcuts", "nowhere"], 17, "nowhere: no such folder"),
+        (["skills", "."], 17, ".: no library, as it has no library.json"),
+        (["propose", "stow_hammer", "--operators", "no"], 15, "read no: No such file or directory"),
         (
             ["plan", "obstacle2d", "--planner", "ff", "--shortcuts", LIBRARY],
             15,

@@ -91,16 +91,31 @@ def test_options_about_a_task_are_refused_beside_files_that_have_it(tmp_path: Pa
 
 def test_a_rover_sends_from_where_it_sampled(tmp_path: Path) -> None:
     found = planned(tmp_path, PAIRS["survey"])
-    assert found == {"plan": ["sample(r, hill)", "send(r, hill, hill, camp)"]}
+    assert found == {"plan": ["(sample r hill)", "(send r hill hill camp)"]}
 
 
 def test_a_plan_that_is_redirected_can_be_checked(tmp_path: Path) -> None:
     result = invoke(tmp_path, PAIRS["survey"], "plan")
-    assert result.stdout == "sample(r, hill)\nsend(r, hill, hill, camp)\n"
+    assert result.stdout == "(sample r hill)\n(send r hill hill camp)\n; cost = 2 (unit cost)\n"
     check(World.read(*PAIRS["survey"]), read_steps(result.stdout))
     assert result.stderr == "2 operators\n"
 
 
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_field_reads_a_plan_that_is_redirected(tmp_path: Path, name: str) -> None:
+    pytest.importorskip("unified_planning", reason="needs the extra 'up'")
+    from unified_planning.engines import SequentialPlanValidator
+    from unified_planning.io import PDDLReader
+
+    printed = invoke(tmp_path, PAIRS[name], "plan").stdout
+    reader = PDDLReader()
+    task = reader.parse_problem_string(*PAIRS[name])
+    for text, status in ((printed, "VALID"), ("", "INVALID")):
+        read = reader.parse_plan_string(task, text)
+        assert SequentialPlanValidator().validate(task, read).status.name == status
+
+
+EARLIER = "sample(r, hill)\nsend(r, hill, hill, camp)\n"  # as slap plan wrote it before
 COMPETITIONS = """; a plan as other planners write it
 0.000: (SAMPLE r hill) [1.000]
 
@@ -120,11 +135,12 @@ def check_by_command(plan: Path) -> subprocess.CompletedProcess[str]:
     ("plan", "code", "words"),
     [
         (COMPETITIONS, 0, "valid: 2 steps"),
+        (EARLIER, 0, "valid: 2 steps"),
         ("sample(r, hill)\nsent hill\n", 1, "invalid: line 2 is no step: sent hill"),
-        ("(send r hill hill camp)", 1, "invalid: step 1: send(r, hill, hill, camp) is not poss"),
+        ("(send r hill hill camp)", 1, "invalid: step 1: (send r hill hill camp) is not poss"),
         (None, 2, "No such file or directory"),
     ],
-    ids=["as others write", "no step", "not possible", "no file"],
+    ids=["as others write", "as before", "no step", "not possible", "no file"],
 )
 def test_plans_of_others_are_checked(
     tmp_path: Path, plan: str | None, code: int, words: str
@@ -142,8 +158,9 @@ def test_plans_of_others_are_checked(
 def test_costs_are_minimised_and_said(tmp_path: Path) -> None:
     found = planned(tmp_path, PAIRS["haulage"])
     assert found["cost"] == 8
-    assert "drive(t, x, y)" in found["plan"]
+    assert "(drive t x y)" in found["plan"]
     result = invoke(tmp_path, PAIRS["haulage"], "plan")
+    assert result.stdout.endswith("\n; cost = 8 (general cost)\n")
     assert "6 operators, cost 8, the least" in result.stderr
 
 
@@ -156,7 +173,7 @@ def test_a_cost_that_the_problem_forgets_is_said(tmp_path: Path, planner: str) -
     result = invoke(tmp_path, (domain, problem), "plan", "--planner", planner)
     assert result.exit_code == ErrorCode.UNSOLVABLE
     assert result.stderr.endswith(
-        "; left out, as :init does not give what their cost is made of: drive(t, x, y) and 1 more\n"
+        "; left out, as :init does not give what their cost is made of: (drive t x y) and 1 more\n"
     )
 
 
@@ -174,6 +191,15 @@ def test_the_other_definition_is_named(tmp_path: Path) -> None:
     result = invoke(tmp_path, PAIRS["survey"][::-1], "plan")
     assert result.exit_code == ErrorCode.MALFORMED_PDDL
     assert "expected (define (domain NAME) ...), found a problem only" in result.stderr
+
+
+def test_what_cannot_be_read_is_named_once_and_what_is_missing_said(tmp_path: Path) -> None:
+    result = slap("plan", tmp_path / "nope.pddl")
+    assert result.exit_code == ErrorCode.INVALID_PARAMETER
+    assert result.stderr.endswith("nope.pddl: No such file or directory\n")
+    (tmp_path / "domain.pddl").write_text(SURVEY, encoding="utf-8")
+    result = slap("plan", tmp_path / "domain.pddl")
+    assert "found a domain only; give the problem's file after" in result.stderr
 
 
 def test_both_definitions_in_one_file(tmp_path: Path) -> None:
@@ -263,7 +289,9 @@ def test_an_unknown_engine_is_named(tmp_path: Path) -> None:
     pytest.importorskip("unified_planning", reason="needs the extra 'up'")
     result = invoke(tmp_path, PAIRS["survey"], "plan", "--planner", "up:nobody")
     assert result.exit_code == ErrorCode.INVALID_PARAMETER
-    assert "no engine 'nobody'" in " ".join(result.stderr.split())
+    told = " ".join(result.stderr.split())
+    assert "no engine 'nobody'" in told
+    assert "validator" not in told  # that is no planner
 
 
 def test_without_the_extra_it_is_said_how_to_install_it(

@@ -150,7 +150,8 @@ def test_a_run_closes_its_bag(network, tmp_path):
         recorded = tmp_path / "bag" / "bag_0.mcap"
         # It moves: the topic of commands is announced in the bag with the first of them.
         moves_on(process, lambda: recorded.exists() and b"/slap/command" in recorded.read_bytes())
-        ends_well(process, signal.SIGTERM, to_all=False)
+        told = ends_well(process, signal.SIGTERM, to_all=False)
+    assert told.splitlines()[-2:] == ["bag: bag", "terminated"]
     found = evaluate_bag(tmp_path / "bag")
     assert found.damage is None
     assert not found.runs[-1].success

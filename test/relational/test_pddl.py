@@ -610,6 +610,7 @@ PROBLEM_ERRORS = [
 GOAL_ERRORS = [
     ("", MalformedPddlError, "1:1: there is nothing"),
     ("On", MalformedPddlError, "1:1: expected '(', found 'On'"),
+    ("On(block1, target)", MalformedPddlError, "1:1: On(block1, target) is not PDDL: write (On b"),
     ("(and\n  (On block1 moon))", UnknownObjectError, "2:14: unknown object 'moon'; known here: b"),
     ("(and\n  (Onn block1 target))", UnknownPredicateError, "2:4: unknown predicate 'Onn'"),
     ("(On block1)", MismatchedAtomError, "1:2: On takes 2 objects, got 1"),

@@ -50,6 +50,7 @@ AHEAD = np.array([0.02, 0.0, 0.0, 0.0, 0.0])  # m, m, m, rad, 1
 CLOSE = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
 DOWN = np.array([0.0, 0.0, -0.02, 0.0, 0.0])
 STAY = np.zeros(5)
+STAY_JOINTS = np.zeros(7)
 STIFF = ArmMotors(stiffness=10.0, lag_s=0.015)  # the lag of the contact world's own hand
 
 
@@ -189,6 +190,25 @@ def test_the_elbow_goes_where_that_moves_no_hand():
         assert np.linalg.norm(unmoved @ posture) > 0.99 * np.linalg.norm(posture)
     far = control.commands(joints + 0.5, joints, np.zeros(7))
     assert max(np.abs(far) / TORQUE) == pytest.approx(1.0)
+
+
+def test_where_a_command_has_the_hand_is_computed_once(domain, monkeypatch):
+    """A command stands for 25 periods of the controller; others between leave it the same."""
+    computed = []
+
+    def counted(joints):
+        computed.append(joints)
+        return grasp_pose(joints)
+
+    monkeypatch.setattr("slap_ros.robot.mujoco.impedance.grasp_pose", counted)
+    world = loop_world(domain, HandImpedance())
+    for _ in range(4):
+        world.step(AHEAD)
+    assert len(computed) <= 5
+    control, joints, told = HandImpedance(), HOME, np.add(HOME, 0.1)
+    first = control.commands(told, joints, STAY_JOINTS)
+    assert control.commands(HOME, joints, STAY_JOINTS) != first
+    assert control.commands(told.tolist(), joints, STAY_JOINTS) == first
 
 
 def pressed_n(world):

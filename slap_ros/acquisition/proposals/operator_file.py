@@ -14,7 +14,7 @@ from slap_ros.acquisition.proposals.complaints import Complaint, serious
 from slap_ros.acquisition.proposals.drafts import check_operator
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.errors import InvalidParameterError, MalformedAnswerError, ProposalRejectedError
-from slap_ros.files import parse_json, read_bytes
+from slap_ros.files import parse_json, read_bytes, reason_of
 from slap_ros.language.formats import (
     LABELS,
     AtomDraft,
@@ -48,7 +48,7 @@ def read_operators(path: Path, problem: AcquisitionProblem) -> tuple[LiftedOpera
     try:
         text = decode(read_bytes(path))
     except (OSError, UnicodeDecodeError) as error:
-        raise InvalidParameterError(f"cannot read {path}: {error}") from error
+        raise InvalidParameterError(f"cannot read {path}: {reason_of(error)}") from error
     operators: list[LiftedOperator] = []
     complaints: list[Complaint] = []
     for draft in _drafts(text, str(path)):

@@ -30,7 +30,7 @@ class GroundAction:
     """An operator applied to objects.
 
     Args:
-        name: Name with its objects, as in ``drive(truck, depot, shop)``.
+        name: Name with its objects, as plans list it: ``(drive truck depot shop)``.
         precondition: Mask of bits that must be set.
         effects: Effects, all of which are judged in the state before the action.
         cost: Cost, at least 0.

@@ -355,8 +355,8 @@ def _ground(
     precondition = conditions.ground(found.action.precondition, found.binding)
     if precondition is None:
         return None
-    names = ", ".join(found.binding[variable.name] for variable in found.action.parameters)
-    name = f"{found.action.name}({names})"
+    objects = [found.binding[variable.name] for variable in found.action.parameters]
+    name = f"({' '.join((found.action.name, *objects))})"
     cost = _cost(found, problem)
     if cost is None:
         without_cost.append(name)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -33,6 +34,7 @@ from slap_ros.relational.pddl.types import TypeNames
 from slap_ros.relational.predicates import GroundAtom, Predicate
 from slap_ros.relational.state import Layout
 
+_PRINTED_ATOM = re.compile(r"\s*([\w-]+)\(([^()]*)\)\s*")  # On(block1, target)
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 
 
@@ -96,6 +98,9 @@ def parse_goal(text: str, space: AtomSpace, source: str = "<goal>") -> frozenset
         MismatchedAtomError: An atom with the wrong number or types of objects, or with one
             object twice.
     """
+    if printed := _PRINTED_ATOM.fullmatch(text):
+        words = " ".join((printed[1], *printed[2].replace(",", " ").split()))
+        raise MalformedPddlError(f"{source}:1:1: {text.strip()} is not PDDL: write ({words})")
     return _ground(read_conjunction(read_list(text, source)), space.predicates, space.layout)
 
 

@@ -100,6 +100,8 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
         wanted = f"{listed.position}: expected (define ({kind} NAME) ...)"
         other = title.head if isinstance(title, ListNode) else ""
         found = f", found a {other} only" if other in ("domain", "problem") else ""
+        if (kind, other) == ("problem", "domain"):
+            found += "; give the problem's file after the domain's"
         raise MalformedPddlError(f"{wanted}{found}")
     if len(title.items) != 2:
         raise MalformedPddlError(f"{title.position}: expected ({kind} NAME)")

@@ -68,7 +68,7 @@ class ContactLoopWorld(MeasuredWorld):
         command = self._servo.act(self._state, action)
         if (gap := command.gripper.gap) is not None:
             self._controllers.command_fingers(gap)
-        self._controllers.replace_motion(self.plant.control.replacing(command.points))
+        self._controllers.replace_motion(command.points)
         for _ in range(PERIODS):
             self._controllers.pass_period()
         self._state = self._measured(self._state)

@@ -13,8 +13,10 @@ import math
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.geometry.pose import Pose
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.mujoco.arm import TORQUE, ArmControl, ArmMotors, MotorLaw, Numbers
 from slap_ros.worlds.contact.hand import rotation_between
@@ -69,7 +71,8 @@ class HandImpedance:
         Returns:
             None of them beyond a Panda's.
         """
-        now, goal, rates = GraspKinematics(joints), grasp_pose(told), [float(v) for v in velocities]
+        now, rates = GraspKinematics(joints), [float(v) for v in velocities]
+        goal = _goal(tuple(map(float, told)))
         rows = now.jacobian().tolist()
         *speed, wx, wy, wz = (_product(row, rates) for row in rows)
         damping = DAMPING * math.sqrt(self.stiffness)
@@ -89,6 +92,12 @@ class HandImpedance:
             1.0, *(abs(torque) / most for torque, most in zip(torques, TORQUE, strict=True))
         )
         return [torque / excess for torque in torques]
+
+
+@lru_cache(maxsize=1)
+def _goal(told: tuple[float, ...]) -> Pose:
+    """Where joint positions have the grasp; they are the same for a control period."""
+    return grasp_pose(told)
 
 
 # Plain Python: numpy's linear algebra has other last bits on other processors, and contact

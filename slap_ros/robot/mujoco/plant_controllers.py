@@ -60,7 +60,7 @@ class PlantControllers:
             ControllerAbortedError: The arm is too far from where it should be.
         """
         plant = self._plant
-        self.replace_motion([TrajectoryPoint(motion.duration_s, motion.target, STILL, STILL)])
+        self._start([TrajectoryPoint(motion.duration_s, motion.target, STILL, STILL)])
         while True:
             self.pass_period()
             outcome = self._arm.check(plant.time_s, plant.joints, plant.joint_velocities)
@@ -73,8 +73,11 @@ class PlantControllers:
         """Begin a motion of the arm in place of the one under way; no time passes.
 
         Args:
-            points: Points of the trajectory.
+            points: Points of the trajectory, which the arm's control follows in its own way.
         """
+        self._start(self._plant.control.replacing(points))
+
+    def _start(self, points: Sequence[TrajectoryPoint]) -> None:
         plant = self._plant
         velocities = plant.joint_velocities
         self._arm.start(points, self._tolerances, plant.time_s, plant.joints, velocities)
