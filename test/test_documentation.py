@@ -10,6 +10,9 @@ import pytest
 import yaml
 
 import slap_ros
+from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.learning.setting_changes import setting_names
+from slap_ros.shortcuts.settings import TrainingSettings
 from tools import quotations
 from tools.pictures import architecture
 
@@ -81,6 +84,20 @@ def test_every_class_that_pages_name_is_in_the_sources():
         if name not in known
     ]
     assert not dead
+
+
+def test_settings_that_pages_name_have_that_name_today():
+    """Earlier names are read as well, and ``skill-figures.md`` has commands that were recorded."""
+    known = {*setting_names(AcquisitionSettings), *setting_names(TrainingSettings)}
+    groups = "|".join(sorted({name.partition(".")[0] for name in known if "." in name}))
+    stale = [
+        f"{page.name}: {name}"
+        for page in PAGES
+        if page.name != "skill-figures.md"
+        for name in re.findall(rf"(?:--set |`)((?:{groups})\.[a-z_]+)[=`]", page.read_text("utf-8"))
+        if name not in known and not name.endswith(".py")
+    ]
+    assert not stale
 
 
 def test_the_citation_is_of_this_version():

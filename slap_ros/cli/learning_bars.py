@@ -12,6 +12,7 @@ from typing import Self
 from rich.progress import ProgressColumn, TaskID, TextColumn
 
 from slap_ros.cli.bars import Bars
+from slap_ros.cli.console import console
 
 REFRESH_S = 1.0
 
@@ -45,10 +46,13 @@ class LearningBars:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self.unfollow()
-        if "bars" in vars(self):
-            self.bars.stop()
+        if "bars" not in vars(self):
+            return
+        self.bars.stop()
+        if kind is not None and issubclass(kind, KeyboardInterrupt):
+            console.print("what was done is kept: the same command goes on")
 
     def on_progress(self, what: str, done: int, total: int) -> None:
         """So many jobs of a kind are done.

@@ -23,7 +23,7 @@ PLANNERS = ("anytime", "lazy", "ff", "astar")  # anytime and lazy: ff, then chea
 
 
 @dataclass(frozen=True)
-class SymbolicPlan:
+class PddlPlan:
     """A plan as it is printed.
 
     Args:
@@ -77,7 +77,7 @@ def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, 
         domain = parse_domain(read_pddl(domain_file), str(domain_file))
         problem = parse_problem(read_pddl(problem_file), domain, str(problem_file))
         try:
-            found = plan_symbolically(domain, problem, planner, effort)
+            found = find_pddl_plan(domain, problem, planner, effort)
         except PlanningLimitError as error:
             raise PlanningLimitError(
                 f"{error}; --effort {10 * effort} allows ten times as much"
@@ -91,9 +91,9 @@ def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, 
     console.print(str(found))
 
 
-def plan_symbolically(
+def find_pddl_plan(
     domain: PddlDomain, problem: PddlProblem, planner: str = "anytime", effort: int = 1
-) -> SymbolicPlan:
+) -> PddlPlan:
     """A plan for a PDDL problem.
 
     Args:
@@ -123,7 +123,7 @@ def plan_symbolically(
         raise UnsolvableError(f"{error}{_left_out(task)}") from error
     cost = sum(task.actions[index].cost for index in actions)
     steps = tuple(task.actions[index].name for index in actions)
-    return SymbolicPlan(steps, cost if problem.minimises_cost else None, is_cheapest)
+    return PddlPlan(steps, cost if problem.minimises_cost else None, is_cheapest)
 
 
 def _search(

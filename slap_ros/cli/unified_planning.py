@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.cli.plan_pddl import SymbolicPlan
+from slap_ros.cli.plan_pddl import PddlPlan
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INSTALL = "pip install 'slap_ros[up]'"
 
 
-def plan_with_engine(domain: str, problem: str, engine: str) -> SymbolicPlan:
+def plan_with_engine(domain: str, problem: str, engine: str) -> PddlPlan:
     """The plan of an engine, read by unified-planning from the files' own text.
 
     Args:
@@ -55,7 +55,7 @@ def plan_with_engine(domain: str, problem: str, engine: str) -> SymbolicPlan:
                 "durative actions; that is not read here"
             )
         steps = tuple(map(_as_step, result.plan.actions))
-        return SymbolicPlan(steps, _cost(task, result.plan), status == "SOLVED_OPTIMALLY")
+        return PddlPlan(steps, _cost(task, result.plan), status == "SOLVED_OPTIMALLY")
 
 
 @contextmanager

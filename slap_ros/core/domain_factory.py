@@ -60,8 +60,9 @@ class DomainFactory:
         """
         preset = preset or self.presets[0]
         if preset not in self.presets:
+            settings = f"; settings follow one, {self.presets[0]}:{preset}" if "=" in preset else ""
             raise InvalidParameterError(
-                f"unknown preset {preset!r}; there are {', '.join(self.presets)}"
+                f"unknown preset {preset!r}; there are {', '.join(self.presets)}{settings}"
             )
         places = self._places()
         if changes and places < 2:

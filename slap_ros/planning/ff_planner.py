@@ -32,7 +32,7 @@ class FFPlanner:
         """See :class:`~slap_ros.planning.planner.Planner`."""
         model = self.problem.model
         before, start = model.executed, model.space.abstract(state)
-        grounds = [ground for ground, _ in self.problem.operators]
+        grounds = self.problem.grounds
         forbidden: set[tuple[int, int]] = set()
         failures = Failures()
         for _ in range(self.max_attempts):

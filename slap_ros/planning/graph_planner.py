@@ -14,7 +14,7 @@ from slap_ros.planning.abstract_graph import MAX_NODES, AbstractGraph, build_abs
 from slap_ros.planning.graph_beyond import add_beyond
 from slap_ros.planning.lazy_search import SearchLimits, search_lazily
 from slap_ros.planning.model import Model
-from slap_ros.planning.plan import PlanningResult
+from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.recovery import Recovery
 from slap_ros.planning.search import SearchOutcome
@@ -68,8 +68,7 @@ class GraphPlanner:
 
     def plan(self, state: State, goal: int) -> PlanningResult:
         """See :class:`~slap_ros.planning.planner.Planner`."""
-        model = self.problem.model
-        before, remark = model.executed, ""
+        before, remark = self.problem.model.executed, ""
         try:
             graph, outcome = self.search_to(state, goal)
         except UnsolvableError:
@@ -87,10 +86,13 @@ class GraphPlanner:
                 plan, remark = recovery.despite_failures(), outcome.reason
             if plan is None:
                 raise UnsolvableError(outcome.reason)
-        rolled_out = model.executed - before
-        sizes = len(graph.nodes), len(graph.edges)
-        at_least = outcome.at_least or 0
-        return PlanningResult(plan, *sizes, rolled_out, remark, graph, at_least=at_least)
+        result = self._result(plan, graph, before)
+        return replace(result, fails=remark, at_least=outcome.at_least or 0)
+
+    def _result(self, plan: Plan, graph: AbstractGraph, before: int) -> PlanningResult:
+        """A plan through a graph, for which the model had rolled out so many options before."""
+        rolled_out = self.problem.model.executed - before
+        return PlanningResult(plan, len(graph.nodes), len(graph.edges), rolled_out, graph=graph)
 
     def _search_deeper(
         self, state: State, goal: int, graph: AbstractGraph, outcome: SearchOutcome
@@ -128,10 +130,7 @@ class GraphPlanner:
         for planner in (self, self.deepened()):
             found = UnforeseenSearch(self.problem, goal, planner.search_to).plan(state)
             if found is not None:
-                plan, graph = found
-                sizes = len(graph.nodes), len(graph.edges)
-                rolled_out = self.problem.model.executed - before
-                return PlanningResult(plan, *sizes, rolled_out, graph=graph)
+                return self._result(*found, before)
         return None
 
     def search_to(self, state: State, goal: int) -> tuple[AbstractGraph, SearchOutcome]:

@@ -99,10 +99,10 @@ class PlanningResult(ShownInNotebooks):
     graph_edges: int
     edges_rolled_out: int
     fails: str = ""
-    graph: AbstractGraph | None = field(default=None, repr=False, compare=False)
-    seconds: float = field(default=0.0, repr=False, compare=False)
-    origin: PlanOrigin = field(default=PlanOrigin(), repr=False, compare=False)
-    planner: Planner | None = field(default=None, repr=False, compare=False)
+    graph: AbstractGraph | None = field(default=None, compare=False)
+    seconds: float = field(default=0.0, compare=False)
+    origin: PlanOrigin = field(default=PlanOrigin(), compare=False)
+    planner: Planner | None = field(default=None, compare=False)
     at_least: int = field(default=0, compare=False)
 
     @property

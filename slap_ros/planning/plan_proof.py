@@ -119,8 +119,7 @@ class PlanProof:
         Where each option changes whether one atom holds, layers of the graph alternate in it, so
         that each forward edge leads to the next layer. The goal is in the last one.
         """
-        grounds = [ground for ground, _ in self._problem.operators]
-        if self._shortcuts is not None or not alternate(grounds, self._start):
+        if self._shortcuts is not None or not alternate(self._problem.grounds, self._start):
             return None
         fewest = self._fewest_options(self._start)
         return fewest if fewest == self.first_options else None
@@ -158,8 +157,8 @@ class PlanProof:
             follows: Whether each comes right after another; see
                 :meth:`~slap_ros.core.ProvingSkill.least_steps_in_plans`.
         """
-        grounds = [ground for ground, _ in self._problem.operators]
-        changing = reduce(or_, (one.add_effects | one.delete_effects for one in grounds), 0)
+        effects = (one.add_effects | one.delete_effects for one in self._problem.grounds)
+        changing = reduce(or_, effects, 0)
         always = self._start & ~changing
         skills = {option.skill.name: option.skill for _, option in self._problem.operators}
         least = {

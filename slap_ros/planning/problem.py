@@ -91,6 +91,11 @@ class Problem:
         model = Model.of(domain, initial, is_canceled)
         return cls(model, options, unskilled, domain.exact, domain.is_measured)
 
+    @property
+    def grounds(self) -> list[GroundOperator]:
+        """The operators without their options."""
+        return [ground for ground, _ in self.operators]
+
     def require_reachable(self, start: int, goal: int) -> None:
         """Refuse a goal that is easily seen to be out of reach.
 
@@ -101,14 +106,12 @@ class Problem:
         Raises:
             UnsolvableError: Atoms of it never hold, or never hold together.
         """
-        grounds = [ground for ground, _ in self.operators]
-        if why := _what_never_holds(self.model.space, start, goal, grounds):
+        if why := _what_never_holds(self.model.space, start, goal, self.grounds):
             raise UnsolvableError(why)
 
     def why_not(self, start: int, goal: int) -> str:
         """Why operators alone do not lead from an abstract state to a goal, both masks."""
-        grounds = [ground for ground, _ in self.operators]
-        return why_unreachable(self.model.space, start, goal, grounds, self.unskilled)
+        return why_unreachable(self.model.space, start, goal, self.grounds, self.unskilled)
 
 
 def why_unreachable(

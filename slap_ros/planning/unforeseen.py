@@ -119,5 +119,4 @@ class UnforeseenSearch:
 
     def _may_lead_on(self, abstract: int) -> bool:
         """Whether each atom of the goal can be reached, as far as operators say."""
-        grounds = [ground for ground, _ in self.problem.operators]
-        return not unreachable_atoms(abstract, self.goal, grounds)
+        return not unreachable_atoms(abstract, self.goal, self.problem.grounds)

@@ -8,8 +8,10 @@ from io import StringIO
 
 import pytest
 from rich.console import Console
+from rich.progress import BarColumn
 
 from slap_ros.cli.bars import Bars
+from slap_ros.cli.learning_bars import LearningBars
 
 
 @pytest.fixture
@@ -48,3 +50,10 @@ def test_a_terminal_gets_bars_alone(log: StringIO) -> None:
     with bars(log, log_period_s=0.0, terminal=True) as shown:
         shown.advance(shown.add_task("learning", total=4))
     assert "1 of 4" not in log.getvalue()
+
+
+def test_an_interrupted_training_says_that_it_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyboardInterrupt), LearningBars(BarColumn()) as shown:
+        shown.on_progress("exploring", 1, 2)
+        raise KeyboardInterrupt
+    assert "the same command goes on" in capsys.readouterr().err

@@ -170,6 +170,7 @@ def test_plan_writes_pddl_that_it_can_plan_for_and_a_picture(tmp_path):
         (["run", "moon"], 10, "unknown domain 'moon'; there are obstacle2d"),
         (["evaluate", "moon"], 10, "unknown domain 'moon'"),
         (["plan", "obstacle2d", "--preset", "easy"], 15, "unknown preset 'easy'"),
+        (["plan", "obstacle2d", "--preset", "bystanders=1"], 15, "one, fair:bystanders=1"),
         (["run", "obstacle2d", "--planner", "best"], 15, "unknown planner 'best'"),
         (["plan", "obstacle2d", "--goal", "(On sofa target)"], 13, "unknown object 'sofa'"),
         (["plan", "obstacle2d", "--goal", "(Above block1 table)"], 14, "Above"),

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from typer.testing import Result
 
-from slap_ros.cli.plan_pddl import plan_symbolically
+from slap_ros.cli.plan_pddl import find_pddl_plan
 from slap_ros.errors import ErrorCode
 from slap_ros.relational.pddl import parse_domain, parse_problem
 from support.slap_command import slap
@@ -226,7 +226,7 @@ def test_proposed_operators_follow_the_standard(tmp_path: Path) -> None:
         (output / name).read_text(encoding="utf-8") for name in ("domain.pddl", "problem.pddl")
     ]
     stated = parse_domain(written[0])
-    found = plan_symbolically(stated, parse_problem(written[1], stated))
+    found = find_pddl_plan(stated, parse_problem(written[1], stated))
     assert len(found.steps) == 2
 
 

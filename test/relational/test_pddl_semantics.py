@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from slap_ros.cli.plan_pddl import SymbolicPlan, plan_symbolically
+from slap_ros.cli.plan_pddl import PddlPlan, find_pddl_plan
 from slap_ros.errors import MalformedPddlError, UnsolvableError
 from slap_ros.relational.pddl import parse_domain, parse_problem
 from slap_ros.relational.pddl.grounder import ground_task
@@ -18,10 +18,10 @@ from slap_ros.relational.pddl.tokens import decode
 from tools.check_plan import Change, InvalidPlanError, World, check, read_steps, typed
 
 
-def plan(domain: str, problem: str, planner: str = "astar") -> SymbolicPlan:
+def plan(domain: str, problem: str, planner: str = "astar") -> PddlPlan:
     """A plan that the interpreter accepts, with the cost that the interpreter finds."""
     stated = parse_domain(domain)
-    found = plan_symbolically(stated, parse_problem(problem, stated), planner)
+    found = find_pddl_plan(stated, parse_problem(problem, stated), planner)
     cost = check(World.read(domain, problem), read_steps("\n".join(found.steps)))
     assert found.cost in (None, cost)
     return found
