@@ -36,7 +36,7 @@ def test_a_shortcut_can_be_paid_whatever_exploration_takes(spare):
     with_budgets = replace(request, shortcut_changes=request.affordable_changes(left)).training
     exploration = with_budgets.exploration
     assert with_budgets.budget == left and exploration.budget <= 20_000
-    assert exploration.tasks * exploration.budget + with_budgets.most_steps <= left
+    assert exploration.tasks * exploration.budget + with_budgets.steps_per_shortcut <= left
 
 
 def explore(settings):
