@@ -72,6 +72,8 @@ def _counted(approaches: Mapping[str, int]) -> str:
     """Approaches in words, with the number of demonstrations of each.
 
     Args:
-        approaches: Number of demonstrations by the name of the approach.
+        approaches: Number of demonstrations by the name of the approach, one at least.
     """
-    return ", ".join(f"{name} ({number} demonstrations)" for name, number in approaches.items())
+    (first, number), *others = approaches.items()
+    whole = f"{first} ({number} of {sum(approaches.values())} demonstrations)"
+    return ", ".join([whole, *(f"{name} ({number})" for name, number in others)])

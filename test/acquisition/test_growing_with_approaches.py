@@ -75,7 +75,9 @@ def test_a_round_learns_what_training_with_approaches_does_interrupted_or_not(tm
     assert tried.kept and tried.approaches == {BEHIND: STARTS}
     assert grown.rounds[0].length < 0.5 * grown.rounds[0].length_alone
     page = (asked.folder / "report.md").read_text()
-    assert f"steps; begins with an approach: {BEHIND} ({STARTS} demonstrations)\n" in page
+    assert (
+        f"steps; begins with an approach: {BEHIND} ({STARTS} of {STARTS} demonstrations)\n" in page
+    )
     assert " --settings ours_approaches " in page
     choice = DomainChoice("points", "line", str(tmp_path / "steady"))
     made = train(open_domain(choice), tmp_path / "made", settings=APPROACHES, changes=FEW)
@@ -199,6 +201,5 @@ def test_growth_without_approaches_is_written_as_before():
     assert json.loads(json.dumps(begun.as_json()))["tried"][0]["approaches"] == {
         BEHIND: 2, "thing": 1
     }  # fmt: skip
-    assert f"approach: {BEHIND} (2 demonstrations), thing (1 dem" in growth_page(
-        asked, [begun], 0, ""
-    )
+    page = growth_page(asked, [begun], 0, "")
+    assert f"an approach: {BEHIND} (2 of 3 demonstrations), thing (1)\n" in page

@@ -34,8 +34,8 @@ from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT
 from slap_ros.worlds.features import pose_of
 
 ABOVE = "above"
-TURNS = {side: k * 0.5 * math.pi for k, side in enumerate(("+x", "+y", "-x", "-y"))}  # rad, of the
-# sides from an object's own x axis
+# rad, from an object's own x axis to each of its sides
+TURNS = {side: k * 0.5 * math.pi for k, side in enumerate(("+x", "+y", "-x", "-y"))}
 
 # What is held pushes with its middle where it can: higher up, it tilts in the hand.
 SPARE = 0.002  # m, over the height from which on a thing is held
