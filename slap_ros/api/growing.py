@@ -192,7 +192,7 @@ def _carry_out_round(
     validation = library.record["validation"]
     return replace(
         _of_skills(acquired, validation["pure_planning"], validation["slap"]),
-        tried=tuple(notes.tried),
+        tried=tuple(_with_approaches(one, library) for one in notes.tried),
         shortcut_steps=int(library.record["environment_steps"]["spent"]),
         unsolved=notes.unsolved,
     )
@@ -218,6 +218,18 @@ def _of_skills(acquired: SkillLibrary, length_alone: float, length: float) -> Gr
         skill_steps=int(record["steps"]),
         shortcut_steps=0,
     )
+
+
+def _with_approaches(tried: TriedShortcut, library: ShortcutLibrary) -> TriedShortcut:
+    """A shortcut that was tried, with the approaches that the library says it begins with.
+
+    Args:
+        tried: Shortcut that was tried.
+        library: Library of the shortcuts that were kept.
+    """
+    records = {one.name: one.record for one in library.shortcuts}
+    shown = records.get(tried.name, {}).get("demonstrations", {})
+    return replace(tried, approaches=dict(shown.get("approaches", {})))
 
 
 def _acquire(

@@ -36,12 +36,20 @@ class TriedShortcut:
         after: Mean plan length with the shortcut, environment steps; None where a task was not
             solved.
         kept: Whether the shortcut became part of the library.
+        approaches: Number of demonstrations that begin with each approach, by its name; nothing
+            for a shortcut that was not cloned from any, or not kept.
     """
 
     name: str
     before: float
     after: float | None
     kept: bool
+    approaches: Mapping[str, int] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object, without approaches where there are none."""
+        data = asdict(self)
+        return data if self.approaches else {k: v for k, v in data.items() if k != "approaches"}
 
 
 @dataclass(frozen=True)
@@ -88,7 +96,7 @@ class GrowthRound:
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object."""
-        return asdict(self)
+        return {**asdict(self), "tried": [one.as_json() for one in self.tried]}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> GrowthRound:
@@ -142,11 +150,12 @@ class GrowthRequest:
     def __post_init__(self) -> None:
         if self.steps < self.least_steps:
             training = self.training
+            cloned = training.cloning is not None
             raise InvalidParameterError(
                 f"{self.steps} environment steps are too few for a round: skills take at least "
                 f"{self.least_skill_steps}, rollouts of exploration usually take "
-                f"{self.exploration_steps}, and a shortcut takes {training.most_steps}; "
-                f"give --steps {self.least_steps} or more"
+                f"{self.exploration_steps}, and a shortcut {'usually ' if cloned else ''}takes "
+                f"{training.steps_per_shortcut}; give --steps {self.least_steps} or more"
             )
 
     @property
@@ -168,7 +177,7 @@ class GrowthRequest:
     @property
     def least_shortcut_steps(self) -> int:
         """Environment steps until a shortcut is learned, exploration included."""
-        return self.exploration_steps + self.training.most_steps
+        return self.exploration_steps + self.training.steps_per_shortcut
 
     @property
     def exploration_steps(self) -> int:
@@ -196,7 +205,8 @@ class GrowthRequest:
         training, budgets = self.training, ("budget=", "exploration.budget=")
         most = _no_more(left, training.budget)
         exploration = training.exploration
-        each = _no_more((most - training.most_steps) // exploration.tasks, exploration.budget)
+        spare = most - training.steps_per_shortcut
+        each = _no_more(spare // exploration.tasks, exploration.budget)
         others = [text for text in self.shortcut_changes if not text.startswith(budgets)]
         return [*others, f"budget={most}", f"exploration.budget={each}"]
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from slap_ros.api.growth import GrowthRequest, GrowthRound, TriedShortcut
 
@@ -64,4 +64,16 @@ def _section(number: int, one: GrowthRound) -> str:
 def _in_words(tried: TriedShortcut) -> str:
     after = "unsolved for a task" if tried.after is None else f"{tried.after:.1f} steps"
     kept = "" if tried.kept else "; not kept"
-    return f"{tried.name}: {tried.before:.1f} steps → {after}{kept}"
+    begins = f"; begins with an approach: {_counted(tried.approaches)}" if tried.approaches else ""
+    return f"{tried.name}: {tried.before:.1f} steps → {after}{kept}{begins}"
+
+
+def _counted(approaches: Mapping[str, int]) -> str:
+    """Approaches in words, with the number of demonstrations of each.
+
+    Args:
+        approaches: Number of demonstrations by the name of the approach, one at least.
+    """
+    (first, number), *others = approaches.items()
+    whole = f"{first} ({number} of {sum(approaches.values())} demonstrations)"
+    return ", ".join([whole, *(f"{name} ({number})" for name, number in others)])

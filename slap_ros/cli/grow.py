@@ -65,7 +65,10 @@ class GrowOptions:
     set_skills: Annotated[list[str] | None, setting_changes("sac.gamma=0.99")] = None
     settings: Annotated[
         str,
-        typer.Option(help="Hyper-parameters of shortcuts, as for `slap train`."),
+        typer.Option(
+            help="Hyper-parameters of shortcuts, as for `slap train`. With ours_approaches, they "
+            "may begin with a way round an object."
+        ),
     ] = NEAR
     set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None
     steps: Annotated[

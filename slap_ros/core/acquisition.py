@@ -58,10 +58,12 @@ class SideApproach:
             gives up.
         onwards: Robot's action that moves the hand on towards the object at full speed, shape
             (axes,).
+        side: Name of the side, in the object's own frame where it has one; empty for none.
     """
 
     policy: Policy
     onwards: Array
+    side: str = ""
 
 
 # (state, object) to ways of going near it, from each side that the hand can be at.

@@ -170,12 +170,13 @@ def run_in_order(
         what: Name of the step that the jobs are, in words.
         callback: Callback that is told before the first job and after each.
         finished: Jobs that have ended already, which are not run again; each that ends is added.
-            None to run them all and keep none.
+            There may be more of them than are asked for. None to run them all and keep none.
 
     Returns:
         The results in the order of the jobs.
     """
-    results: dict[int, Result] = finished.of(what) if finished is not None else {}
+    ended: dict[int, Result] = finished.of(what) if finished is not None else {}
+    results = {number: result for number, result in ended.items() if number < len(jobs)}
     callback.on_progress(what, 0, len(jobs))
     if results:
         callback.on_progress(what, len(results), len(jobs))

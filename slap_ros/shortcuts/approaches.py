@@ -20,10 +20,12 @@ from slap_ros.errors import InvalidStateError
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import Object, State
 from slap_ros.relational.state import Array
-from slap_ros.shortcuts.exploration_policies import tilted
+from slap_ros.shortcuts.exploration_policies import tilted, within_reach
 
 APPROACHED = "pushes after an approach"  # in the records of what they found
 MOST_STEPS = 60  # environment steps after which an approach is given up
+USUAL_STEPS = 20  # environment steps that an approach usually takes
+TRIED_SIDES = 2  # of an object, usually, until an approach with a push reaches the target
 PUSHES = 4  # in different directions, after each approach of a demonstration
 
 
@@ -35,11 +37,13 @@ class Approached:
         state: State in which it has ended.
         commands: Robot's actions until then, shape (steps, axes).
         onwards: Policy's action that moves the hand on towards the object, from -1 to 1.
+        side: Name of the side that the hand is at.
     """
 
     state: State
     commands: Array
     onwards: Array
+    side: str
 
 
 def sides_of(domain: Domain, state: State, obj: Object) -> tuple[SideApproach, ...]:
@@ -91,7 +95,7 @@ class Approacher:
             commands = self._execute(state, side)
             if commands:
                 onwards = self._to_action.inverse(side.onwards)
-                yield Approached(self._world.state, np.array(commands), onwards)
+                yield Approached(self._world.state, np.array(commands), onwards, side.side)
 
     def _execute(self, state: State, side: SideApproach) -> list[Array]:
         """The actions of an approach; none where it does not arrive, or is there already."""
@@ -110,7 +114,7 @@ class Approacher:
 
     def pushes(
         self, state: State, objects: Sequence[Object], steps: int, rng: np.random.Generator
-    ) -> Iterator[Array]:
+    ) -> Iterator[tuple[str, Array]]:
         """Yield approaches of objects, each with pushes that follow it.
 
         Args:
@@ -120,9 +124,47 @@ class Approacher:
             rng: Generator that draws how much pushes are tilted.
 
         Yields:
-            Robot's actions, shape (steps, axes).
+            Name of the approach, and the robot's actions, shape (steps, axes).
         """
         for obj in objects:
             for approached in self.approach(state, obj):
+                name = approach_name(obj, approached.side)
                 for push in self._to_action(tilted(approached.onwards, PUSHES, rng)):
-                    yield np.concatenate([approached.commands, np.tile(push, (steps, 1))])
+                    pushed = np.tile(push, (steps, 1))
+                    yield name, np.concatenate([approached.commands, pushed])
+
+
+def approach_name(obj: Object, side: str) -> str:
+    """The name of an approach in records, which is the same for all objects of a type.
+
+    Args:
+        obj: Object that is approached.
+        side: Name of the side from which it is; empty for none.
+    """
+    return f"{obj.type.name} from {side}" if side else obj.type.name
+
+
+def usual_steps_of_pushes(push: int) -> int:
+    """Estimate the environment steps of trying approaches with pushes until one gets there.
+
+    Args:
+        push: Environment steps of a push.
+    """
+    return TRIED_SIDES * (USUAL_STEPS + PUSHES * (USUAL_STEPS + push // 2))
+
+
+def most_steps_of_pushes(domain: Domain, objects: int, push: int) -> int:
+    """Count the environment steps of trying all approaches, each with all pushes that follow it.
+
+    Args:
+        domain: Domain of the objects.
+        objects: Number of objects that are approached.
+        push: Environment steps of a push.
+
+    Returns:
+        Environment steps where each approach takes as many as it may.
+    """
+    state = domain.task(0).initial_state
+    each = [len(sides_of(domain, state, obj)) for obj in within_reach(domain, state)]
+    sides = max(each, default=0)
+    return objects * sides * (MOST_STEPS + PUSHES * (MOST_STEPS + push))

@@ -57,6 +57,11 @@ class ShortcutCloningSettings:
     disturbance: float = 0.2
 
     @property
+    def repetitions(self) -> int:
+        """Number of times that each execution is made again, to see what a policy observes."""
+        return 1 + self.disturbed
+
+    @property
     def rollout_steps(self) -> int:
         """Environment steps between two reports, all environments together."""
         return self.n_envs

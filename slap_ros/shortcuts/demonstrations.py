@@ -24,13 +24,14 @@ from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
 from slap_ros.relational.state import Array
-from slap_ros.shortcuts.approaches import Approacher
+from slap_ros.shortcuts.approaches import MOST_STEPS, Approacher, most_steps_of_pushes
 from slap_ros.shortcuts.kept_shortcuts import NOTHING_KEPT, KeptShortcuts, graph_of
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.observation_layout import ObservationLayout, observation_layout
 from slap_ros.shortcuts.signature import Signature, concerned
 from slap_ros.shortcuts.starts import Start, StartRecord, restore_starts, shortest_paths
 from slap_ros.shortcuts.straightening import (
+    SETTLING,
     ChainExecutor,
     StraightenedExecution,
     Straightener,
@@ -38,6 +39,8 @@ from slap_ros.shortcuts.straightening import (
 
 MOST_ORDERS = 24  # of the objects in an observation that are learned from
 MOST_WAYS = 4  # ways from a start to its target that are executed until one gets there
+
+Shown = tuple[str, Array]  # name of an approach, and the robot's actions, shape (steps, axes)
 
 
 @dataclass(frozen=True)
@@ -50,20 +53,23 @@ class ShortcutDemonstration:
         replaced: Environment steps of the skills, or of approach and push, before their execution
             was made shorter.
         environment_steps: Environment steps that it took to find.
+        approach: Name of the approach that it begins with; empty where skills showed it.
     """
 
     start: StartRecord
     actions: tuple[tuple[float, ...], ...]
     replaced: int
     environment_steps: int
+    approach: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object."""
+        """A JSON object, which names an approach only where there is one."""
         return {
             "start": self.start.as_json(),
             "actions": [list(action) for action in self.actions],
             "replaced": self.replaced,
             "environment_steps": self.environment_steps,
+            **({"approach": self.approach} if self.approach else {}),
         }
 
     @classmethod
@@ -77,7 +83,51 @@ class ShortcutDemonstration:
         if not actions or len({len(action) for action in actions}) > 1:
             raise ValueError("its actions are not all of one size")
         start = StartRecord.from_json(data["start"])
-        return cls(start, actions, int(data["replaced"]), int(data["environment_steps"]))
+        replaced, steps = int(data["replaced"]), int(data["environment_steps"])
+        return cls(start, actions, replaced, steps, str(data.get("approach", "")))
+
+
+@dataclass(frozen=True)
+class DemonstrationAttempt:
+    """What came of trying to demonstrate a shortcut from one of its starts.
+
+    Args:
+        shown: Demonstration; None where nothing shows the shortcut.
+        environment_steps: Environment steps that it took to find, or to find none.
+    """
+
+    shown: ShortcutDemonstration | None
+    environment_steps: int
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object: the demonstration, or the environment steps that were in vain."""
+        if self.shown is None:
+            return {"environment_steps": self.environment_steps}
+        return self.shown.as_json()
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any] | None) -> DemonstrationAttempt:
+        """The attempt of :meth:`as_json`.
+
+        Args:
+            data: JSON object; None where an earlier version has counted no steps in vain.
+
+        Raises:
+            KeyError, TypeError, ValueError: The data is no attempt.
+        """
+        if data is None:
+            return cls(None, 0)
+        shown = ShortcutDemonstration.from_json(data) if "start" in data else None
+        return cls(shown, int(data["environment_steps"]))
+
+    def total_steps(self, repetitions: int) -> int:
+        """Environment steps with those of making the demonstration again.
+
+        Args:
+            repetitions: Number of times that it is made again, from its start to its end.
+        """
+        again = 0 if self.shown is None else repetitions * len(self.shown.actions)
+        return self.environment_steps + again
 
 
 class Demonstrated(NamedTuple):
@@ -139,7 +189,7 @@ def demonstrate(
     rng: np.random.Generator,
     kept: KeptShortcuts = NOTHING_KEPT,
     push: int = 0,
-) -> ShortcutDemonstration | None:
+) -> DemonstrationAttempt:
     """Execute what leads from a start to its target, and make the execution shorter.
 
     Args:
@@ -153,13 +203,14 @@ def demonstrate(
             do.
 
     Returns:
-        The demonstration; None where they do not lead to the target, or with actions that the
+        The demonstration; none where they do not lead to the target, or with actions that the
         shortcut has not.
     """
     (start,) = restore_starts(domain, [record])
     encoder = ObservationEncoder(domain, start.space, signature, start.change)
     straightener = Straightener(domain, encoder, start.state)
     model: Approacher | ChainExecutor
+    shown: Iterator[Shown]
     if push:
         model = Approacher(domain, start.state)
         pushes = model.pushes(start.state, concerned(start.change, start.space), push, rng)
@@ -168,17 +219,42 @@ def demonstrate(
         problem = Problem.of(domain, start.state)
         model = ChainExecutor(domain, problem.model.space, start.state)
         shown = _executed(model, kept.planner(domain, problem, start.state), start)
-    for commands in shown:
+    for approach, commands in shown:
         found = straightener.shorten(commands, tries, rng)
         if found is not None:
             actions = tuple(tuple(row) for row in found.actions.tolist())
             steps = model.steps + straightener.steps
-            return ShortcutDemonstration(record, actions, len(commands), steps)
-    return None
+            made = ShortcutDemonstration(record, actions, len(commands), steps, approach)
+            return DemonstrationAttempt(made, steps)
+    return DemonstrationAttempt(None, model.steps + straightener.steps)
 
 
-def _executed(executor: ChainExecutor, planner: GraphPlanner, start: Start) -> Iterator[Array]:
-    """Yield the robot's actions, shape (steps, axes), in ways that lead to the start's target."""
+def most_demonstration_steps(
+    domain: Domain, signature: Signature, executions: int, horizon: int, push: int = 0
+) -> int:
+    """Count the environment steps that a demonstration takes at most, as a rule.
+
+    Args:
+        domain: Domain with the skills.
+        signature: Signature of the shortcut.
+        executions: Number of times that it is executed after it was found, to make it shorter and
+            to learn from it.
+        horizon: Environment steps that skills take at most, as a rule.
+        push: Environment steps of pushes that follow approaches; 0 where skills show it.
+
+    Returns:
+        Environment steps with those of finding it.
+    """
+    if push:
+        longest = MOST_STEPS + push
+        finding = most_steps_of_pushes(domain, len(signature.roles), push)
+    else:
+        longest, finding = horizon, MOST_WAYS * horizon
+    return finding + executions * (longest + SETTLING)
+
+
+def _executed(executor: ChainExecutor, planner: GraphPlanner, start: Start) -> Iterator[Shown]:
+    """Yield the robot's actions in ways that lead to the start's target; no approaches."""
     try:
         graph = graph_of(planner, start.space.abstract(start.state), start.target)
     except SlapError:  # no operators lead there
@@ -186,23 +262,23 @@ def _executed(executor: ChainExecutor, planner: GraphPlanner, start: Start) -> I
     for way in _ways(graph):
         commands = executor.commands(start.state, way, graph.nodes)
         if commands is not None:
-            yield commands
+            yield "", commands
 
 
 def _reaching(
-    pushes: Iterable[Array], encoder: ObservationEncoder, straightener: Straightener
-) -> Iterator[Array]:
-    """Yield the actions that reach the target, up to there.
+    pushes: Iterable[Shown], encoder: ObservationEncoder, straightener: Straightener
+) -> Iterator[Shown]:
+    """Yield the actions that reach the target, up to there, and the approach that they begin with.
 
     Args:
-        pushes: Robot's actions, shape (steps, axes) each.
+        pushes: Approaches with pushes.
         encoder: Encoder for the change that the shortcut makes.
         straightener: Straightener at the start of the shortcut.
     """
-    for commands in pushes:
+    for approach, commands in pushes:
         execution = straightener.execute(encoder.action_map.inverse(commands))
         if execution is not None:
-            yield commands[: execution.steps]
+            yield approach, commands[: execution.steps]
 
 
 def _ways(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:

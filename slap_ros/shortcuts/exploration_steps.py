@@ -9,7 +9,7 @@ from math import ceil
 from slap_ros.core import Domain
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import State
-from slap_ros.shortcuts.approaches import MOST_STEPS, sides_of
+from slap_ros.shortcuts.approaches import USUAL_STEPS, sides_of
 from slap_ros.shortcuts.exploration_policies import PROBE_STEPS, within_reach
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 
@@ -47,8 +47,8 @@ def most_rollout_steps(domain: Domain, settings: ExplorationSettings, state: Sta
     return batches * worlds * settings.length + aiming
 
 
-def most_approach_steps(domain: Domain, settings: ExplorationSettings, state: State) -> int:
-    """Count the environment steps of all approaches from a state, and of what follows them.
+def usual_approach_steps(domain: Domain, settings: ExplorationSettings, state: State) -> int:
+    """Estimate the environment steps of all approaches from a state, and of what follows them.
 
     Args:
         domain: Domain of the state.
@@ -56,13 +56,13 @@ def most_approach_steps(domain: Domain, settings: ExplorationSettings, state: St
         state: State in which the approaches begin.
 
     Returns:
-        Environment steps where every approach takes as many as it may.
+        Environment steps where every approach arrives.
     """
     if not settings.approaches:
         return 0
     pushes = settings.approaches * exploration_worlds(domain, settings) * settings.length
     reach = within_reach(domain, state)
-    return sum(len(sides_of(domain, state, obj)) for obj in reach) * (MOST_STEPS + pushes)
+    return sum(len(sides_of(domain, state, obj)) for obj in reach) * (USUAL_STEPS + pushes)
 
 
 def usual_steps(domain: Domain, settings: ExplorationSettings, skill_steps: int) -> int:
@@ -85,5 +85,5 @@ def usual_steps(domain: Domain, settings: ExplorationSettings, skill_steps: int)
         sources += (settings.nodes - 1) * ((skill_steps - 1) // settings.inside)
     state = domain.task(0).initial_state
     each = most_rollout_steps(domain, settings, state)
-    near = most_approach_steps(domain, settings, state)
+    near = usual_approach_steps(domain, settings, state)
     return settings.tasks * (sources * each + settings.nodes * near)

@@ -155,7 +155,7 @@ def demonstration(
     tries: int,
     kept: KeptShortcuts = NOTHING_KEPT,
     push: int = 0,
-) -> dict[str, Any] | None:
+) -> dict[str, Any]:
     """A demonstration of a shortcut; see :func:`~slap_ros.shortcuts.demonstrations.demonstrate`.
 
     Args:
@@ -167,12 +167,11 @@ def demonstration(
         push: Environment steps of pushes that follow approaches; 0 where skills show the shortcut.
 
     Returns:
-        A :class:`~slap_ros.shortcuts.demonstrations.ShortcutDemonstration` as JSON; None where
-        nothing shows the shortcut.
+        A :class:`~slap_ros.shortcuts.demonstrations.DemonstrationAttempt` as JSON.
     """
     rng = np.random.default_rng([distribution.seed, STARTS.first, start.index])
-    found = demonstrate(distribution.make_domain(), start, signature, tries, rng, kept, push)
-    return None if found is None else found.as_json()
+    domain = distribution.make_domain()
+    return demonstrate(domain, start, signature, tries, rng, kept, push).as_json()
 
 
 def plan_length(

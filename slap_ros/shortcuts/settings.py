@@ -10,6 +10,7 @@ from typing import Any
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.stored_keys import stored
+from slap_ros.shortcuts.approaches import usual_steps_of_pushes
 from slap_ros.shortcuts.cloning_settings import ShortcutCloningSettings
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.ppo_settings import PpoSettings
@@ -106,8 +107,8 @@ class TrainingSettings:
         return sum(stage.total_steps for stage in self.stages)
 
     @property
-    def most_steps(self) -> int:
-        """Environment steps that a shortcut takes if its first stage is learned in all attempts.
+    def policy_steps(self) -> int:
+        """Environment steps of a shortcut's policy if its first stage is learned in all attempts.
 
         A stage ends with the rollout in which its steps are reached.
         """
@@ -115,10 +116,30 @@ class TrainingSettings:
             ceil(stage.total_steps / stage.rollout_steps) * stage.rollout_steps
             for stage in self.stages
         ]
-        showing = 0
-        if self.cloning is not None:  # each try ends with the horizon at the latest, as a rule
-            showing = self.starts * (self.cloning.straightened + 2) * self.horizon
-        return showing + sum(each) + (self.attempts - 1) * each[0]
+        return sum(each) + (self.attempts - 1) * each[0]
+
+    @property
+    def steps_per_shortcut(self) -> int:
+        """Environment steps that are left when a shortcut is begun, in which it can be learned.
+
+        Demonstrations usually take no more than is counted here, and are as many as can be paid.
+        """
+        return self.policy_steps + self.starts * self._demonstration_steps
+
+    @property
+    def _demonstration_steps(self) -> int:
+        """Environment steps that a demonstration usually takes.
+
+        It takes half the horizon, and what follows a stretch half of that. It is executed once as
+        it was found, and again to learn from it.
+        """
+        if self.cloning is None:
+            return 0
+        whole = 2 + self.cloning.repetitions  # found, executed, and made again
+        executed = (self.cloning.straightened + 2 * whole) * self.horizon // 4
+        if not self.exploration.approaches:
+            return executed
+        return executed + usual_steps_of_pushes(self.exploration.length)
 
     def with_total_steps(self, steps: int) -> TrainingSettings:
         """As many environment steps in all, shared among the stages as they are now.

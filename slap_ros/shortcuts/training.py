@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from statistics import fmean
 from typing import Any, TypeVar
@@ -130,8 +131,8 @@ class Training:
         return length
 
     def _affords(self, shortcuts: int) -> bool:
-        """Whether so many shortcuts can still be learned within the budget."""
-        needed = self._spent + shortcuts * self.settings.most_steps
+        """Whether so many shortcuts can still be learned within the budget, as a rule."""
+        needed = self._spent + shortcuts * self.settings.steps_per_shortcut
         return not self.settings.budget or needed <= self.settings.budget
 
     def _most_promising(
@@ -168,12 +169,23 @@ class Training:
         starts = self._steps.starts(group, operator_steps)
         if not starts:  # it can begin in no task
             return length
-        shown = self._steps.demonstrations(group, starts)
-        if self.settings.cloning is not None and not shown:  # nothing shows it
+        attempts = self._steps.demonstrations(group, starts, self._left_to_demonstrate)
+        cloning = self.settings.cloning
+        repetitions = 0 if cloning is None else cloning.repetitions
+        self._spent += sum(one.total_steps(repetitions) for one in attempts)
+        shown = tuple(one.shown for one in attempts if one.shown is not None)
+        if cloning is not None and not shown:  # nothing shows it
             return length
-        learned = with_demonstrations(self._learn(group.signature, starts, shown), shown)
+        learned = self._learn(group.signature, starts, shown)
         self._spent += int(learned.record.get("environment_steps", 0))
+        learned = with_demonstrations(learned, attempts, repetitions)
         return self._judge(with_origin(learned, group), length)
+
+    @property
+    def _left_to_demonstrate(self) -> float:
+        """Environment steps that may be spent before a policy is cloned and tried out."""
+        settings = self.settings
+        return settings.budget - self._spent - settings.policy_steps if settings.budget else inf
 
     def _judge(self, shortcut: Shortcut, length: float) -> float:
         """Keep a shortcut if it shortens plans.

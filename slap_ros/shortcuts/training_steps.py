@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from math import inf
 from typing import Any
 
 from slap_ros.errors import UnsolvableError
@@ -21,7 +22,7 @@ from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.approaches import APPROACHED
 from slap_ros.shortcuts.candidate_groups import CandidateGroup
-from slap_ros.shortcuts.demonstrations import ShortcutDemonstration
+from slap_ros.shortcuts.demonstrations import DemonstrationAttempt, most_demonstration_steps
 from slap_ros.shortcuts.exploration_result import ExplorationResult
 from slap_ros.shortcuts.kept_shortcuts import KeptShortcuts
 from slap_ros.shortcuts.settings import TrainingSettings
@@ -29,6 +30,7 @@ from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.shortcuts.training_callback import TrainingCallback
 
+IN_VAIN = 20  # starts from which nothing shows a shortcut, after which it is given up
 MAX_NAME = 245  # bytes of a result's name: with what a draft of its file has besides, 255
 UNRECORDED = "why was not recorded"  # in work folders of version 0.1.0
 
@@ -111,13 +113,19 @@ class TrainingSteps:
         )
 
     def demonstrations(
-        self, group: CandidateGroup, starts: tuple[StartRecord, ...]
-    ) -> tuple[ShortcutDemonstration, ...]:
+        self, group: CandidateGroup, starts: tuple[StartRecord, ...], left: float = inf
+    ) -> tuple[DemonstrationAttempt, ...]:
         """Make demonstrations of a shortcut, for cloning; none where it is not to be cloned.
 
         Args:
             group: Candidates that the shortcut is learned from.
-            starts: Starts that it is demonstrated from.
+            starts: Starts that it is demonstrated from; the first ones alone if nothing shows it
+                there.
+            left: Environment steps that are left for it; from no start is it demonstrated that
+                could take more.
+
+        Returns:
+            What came of demonstrating it from each start that was tried.
         """
         cloning, exploration = self.settings.cloning, self.settings.exploration
         if cloning is None:
@@ -127,14 +135,58 @@ class TrainingSteps:
         work = [
             (self.distribution, start, group.signature, tries, self.kept, push) for start in starts
         ]
+        most = most_demonstration_steps(
+            self.distribution.make_domain(),
+            group.signature,
+            tries + 1 + cloning.repetitions,
+            self.settings.horizon,
+            push,
+        )
+
+        def within_budget(finished: FinishedJobs) -> list[Any]:
+            return self._demonstrate(work, left, most, cloning.repetitions, finished)
+
         return cached_jobs(
             self.work,
             f"{group.signature.name}/demonstrations",
-            lambda finished: self._run("straightening skills", jobs.demonstration, work, finished),
-            lambda data: tuple(
-                ShortcutDemonstration.from_json(one) for one in data if one is not None
-            ),
+            within_budget,
+            lambda data: tuple(DemonstrationAttempt.from_json(one) for one in data),
         )
+
+    def _demonstrate(
+        self,
+        work: Sequence[tuple[Any, ...]],
+        left: float,
+        most: int,
+        repetitions: int,
+        finished: FinishedJobs,
+    ) -> list[Any]:
+        """Make demonstrations, as many as can be paid: what some have not taken is for others.
+
+        Where nothing shows it, everything is tried, which takes most. So it is given up soon.
+
+        Args:
+            work: Arguments of each job.
+            left: Environment steps that are left for all of them.
+            most: Environment steps that one of them takes at most.
+            repetitions: Number of times that each is made again.
+            finished: Jobs that have ended already.
+
+        Returns:
+            JSON of each attempt.
+        """
+        made: list[Any] = []
+        while len(made) < len(work):
+            attempts = [DemonstrationAttempt.from_json(one) for one in made]
+            spent = sum(one.total_steps(repetitions) for one in attempts)
+            paid = len(work) if left == inf else len(made) + int(left - spent) // most
+            in_vain = all(one.shown is None for one in attempts)
+            asked = min(paid, IN_VAIN) if in_vain else paid
+            if asked <= len(made):
+                break
+            paid_for = work[:asked]
+            made = self._run("straightening skills", jobs.demonstration, paid_for, finished)
+        return made
 
     def validate_alone(self) -> dict[int, int]:
         """Plan for validation tasks without shortcuts.

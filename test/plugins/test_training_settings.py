@@ -157,7 +157,7 @@ def test_steps_are_those_of_all_stages(steps):
     ],
 )
 def test_a_stage_takes_whole_rollouts_and_the_first_may_be_tried_again(learner, most):
-    assert replace(OURS, **learner).most_steps == most
+    assert replace(OURS, **learner).steps_per_shortcut == most
 
 
 def test_steps_that_contradict_themselves_are_refused():

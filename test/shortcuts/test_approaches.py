@@ -9,12 +9,22 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.approach import DISTANCE
-from slap_ros.domains.benchtop.state_access import hand_position, held_thing
+from slap_ros.domains.benchtop.state_access import hand_position, held_thing, yaw_of
 from slap_ros.domains.stack_at_target.scenery import CUBE_HALF
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
-from slap_ros.shortcuts.approaches import APPROACHED, MOST_STEPS, Approacher, sides_of
-from slap_ros.shortcuts.demonstrations import demonstrate
+from slap_ros.shortcuts.approaches import (
+    APPROACHED,
+    MOST_STEPS,
+    Approacher,
+    approach_name,
+    sides_of,
+)
+from slap_ros.shortcuts.demonstrations import (
+    ShortcutDemonstration,
+    demonstrate,
+    most_demonstration_steps,
+)
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.exploration_steps import usual_steps
 from slap_ros.shortcuts.explorer import Explorer
@@ -94,12 +104,17 @@ def test_an_approach_with_a_push_is_shown_in_other_tasks_and_made_shorter(coffee
 
     def show():
         rng = np.random.default_rng(0)
-        return demonstrate(coffee, start, candidate.signature, 30, rng, push=PUSH)
+        return demonstrate(coffee, start, candidate.signature, 30, rng, push=PUSH).shown
 
     shown = show()
     assert shown == show()
     assert len(shown.actions) < shown.replaced < MOST_STEPS + PUSH
-    assert demonstrate(coffee, start, candidate.signature, 30, np.random.default_rng(0)) is None
+    assert shown.approach == "cabinet from +y"  # towards which the drawer opens
+    assert ShortcutDemonstration.from_json(shown.as_json()) == shown
+    skills = demonstrate(coffee, start, candidate.signature, 30, np.random.default_rng(0))
+    assert skills.shown is None
+    most = most_demonstration_steps(coffee, candidate.signature, 31, 60, PUSH)
+    assert 0 < shown.environment_steps < most
     (begin,) = restore_starts(coffee, [start])
     assert held_thing(begin.state) is not None
 
@@ -118,6 +133,21 @@ def test_an_approach_ends_before_the_object_on_each_side_where_there_is_room():
         onwards = approached.onwards[:3] / np.linalg.norm(approached.onwards[:3])
         assert way @ onwards == pytest.approx(CUBE_HALF + DISTANCE, abs=0.005)
     assert approacher.steps == sum(len(approached.commands) for approached in ended)
+
+
+def test_a_side_is_named_in_the_frame_of_the_object_and_so_is_the_approach():
+    """A cube that is turned has its sides elsewhere: +x is where its own x axis points."""
+    domain = get_domain("stack_at_target")
+    state = domain.task(SEED).initial_state
+    for cube in (state.layout.object("cube0"), state.layout.object("cube1")):
+        axis = np.array([np.cos(yaw_of(state, cube)), np.sin(yaw_of(state, cube)), 0.0])
+        ways = {side.side: side.onwards[:3] for side in sides_of(domain, state, cube)}
+        assert list(ways) == ["above", "+x", "+y", "-x", "-y"]
+        assert ways["+x"] / np.linalg.norm(ways["+x"]) == pytest.approx(-axis)
+        assert ways["-x"] == pytest.approx(-ways["+x"])
+        assert ways["above"][2] < 0.0 == ways["above"][0] == ways["above"][1]
+    assert approach_name(cube, "+x") == f"{cube.type.name} from +x"
+    assert approach_name(cube, "") == cube.type.name
 
 
 def test_where_a_domain_knows_no_approaches_there_are_none():

@@ -13,6 +13,8 @@ from slap_ros.api.growth import GrowthRequest
 from slap_ros.domains import get_domain
 from slap_ros.shortcuts.exploration_settings import ExplorationSettings
 from slap_ros.shortcuts.explorer import Explorer
+from slap_ros.shortcuts.named_settings import APPROACHES
+from slap_ros.shortcuts.named_settings import NEAR as NEAR_SETTINGS
 
 MODELS = Path(__file__).parents[2] / "models/grown"
 NEAR = ExplorationSettings(
@@ -28,15 +30,30 @@ def test_growing_keeps_about_as_many_steps_for_exploration_as_it_has_taken(libra
     assert GrowthRequest(domain, Path("grown")).exploration_steps == pytest.approx(taken, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    "library", sorted((MODELS.parent / "approaches").rglob("shortcuts/library.json")), ids=str
+)
+def test_with_approaches_it_keeps_no_less_and_no_more_than_twice_as_many(library):
+    """Those that do not arrive, or whose pushes fail early, take fewer."""
+    domain = get_domain("make_coffee", "fair")
+    taken = json.loads(library.read_text())["environment_steps"]["exploring"]
+    request = GrowthRequest(domain, Path("grown"), shortcut_settings=APPROACHES)
+    assert taken <= request.exploration_steps <= 2 * taken
+
+
+@pytest.mark.parametrize("settings", [NEAR_SETTINGS, APPROACHES])
 @pytest.mark.parametrize("spare", [0, 1, 5_000, 100_000])
-def test_a_shortcut_can_be_paid_whatever_exploration_takes(spare):
+def test_a_shortcut_can_be_paid_whatever_exploration_takes(spare, settings):
     domain = get_domain("stack_at_target", "fair:blocked=1")
-    request = GrowthRequest(domain, Path("grown"), shortcut_changes=["exploration.budget=20000"])
+    budget = ["exploration.budget=20000"]
+    request = GrowthRequest(
+        domain, Path("grown"), shortcut_settings=settings, shortcut_changes=budget
+    )
     left = request.least_shortcut_steps + spare
     with_budgets = replace(request, shortcut_changes=request.affordable_changes(left)).training
     exploration = with_budgets.exploration
     assert with_budgets.budget == left and exploration.budget <= 20_000
-    assert exploration.tasks * exploration.budget + with_budgets.most_steps <= left
+    assert exploration.tasks * exploration.budget + with_budgets.steps_per_shortcut <= left
 
 
 def explore(settings):

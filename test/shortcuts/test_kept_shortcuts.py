@@ -62,12 +62,12 @@ def start(tower, kept, candidates):
 
 @pytest.fixture(scope="module")
 def shown(tower, kept, start):
-    return demonstrate(tower, *start, 40, np.random.default_rng(0), kept)
+    return demonstrate(tower, *start, 40, np.random.default_rng(0), kept).shown
 
 
 def test_it_is_demonstrated_from_where_the_slap_begins(tower, start, shown):
     assert 0 < len(shown.actions) < shown.replaced
-    without = demonstrate(tower, *start, 40, np.random.default_rng(0))
+    without = demonstrate(tower, *start, 40, np.random.default_rng(0)).shown
     assert without is None or without.replaced > 1.5 * shown.replaced  # block by block
 
 

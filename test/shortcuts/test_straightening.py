@@ -91,7 +91,7 @@ def test_a_budget_is_kept(pegs):
 
 def test_a_demonstration_is_shorter_than_the_skills_and_ends_in_the_target(pegs, candidate, start):
     def show():
-        return demonstrate(pegs, start, candidate.signature, 60, np.random.default_rng(1))
+        return demonstrate(pegs, start, candidate.signature, 60, np.random.default_rng(1)).shown
 
     shown = show()
     assert len(shown.actions) < 0.9 * shown.replaced

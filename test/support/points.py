@@ -21,6 +21,7 @@ from slap_ros.core import (
     GripperAxis,
     LearnerInterface,
     Learning,
+    SideApproach,
     Task,
     presets,
 )
@@ -224,6 +225,26 @@ def approach(state, objects):
     return policy
 
 
+def sides(state, obj):
+    """Behind a thing, as seen from each place, so that the hand pushes it there."""
+    if not obj.type.is_a(THING):
+        return ()
+    places = (place for place in state.layout.of_type(PLACE) if not place.type.is_a(THING))
+    return tuple(_behind(state, obj, place) for place in places)
+
+
+def _behind(state, thing, place):
+    way = state[place][:2] - state[thing][:2]
+    way = way / np.linalg.norm(way)
+    goal = state[thing][:2] - BEFORE * way
+
+    def policy(now):
+        left = goal - hand_xy(now)
+        return None if np.linalg.norm(left) < 1e-6 else np.array([*np.clip(left, -STEP, STEP), 0.0])
+
+    return SideApproach(policy, np.array([*STEP * way / np.abs(way).max(), 0.0]), "behind")
+
+
 def _script(gripper):
     """Straight to the last object, then the gripper does its part."""
 
@@ -381,7 +402,7 @@ def _make(preset):
             ),
             make_vector_world=worlds,
         ),
-        acquisition=Acquisition(approach, (PICK, PUT), REWARDS, SCRIPTS, HORIZON),
+        acquisition=Acquisition(approach, (PICK, PUT), REWARDS, SCRIPTS, HORIZON, sides=sides),
     )
 
 

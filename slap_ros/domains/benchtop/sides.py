@@ -33,7 +33,9 @@ from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT
 from slap_ros.worlds.features import pose_of
 
-TURNS = tuple(k * 0.5 * math.pi for k in range(4))  # rad, from an object's x axis to its sides
+ABOVE = "above"
+# rad, from an object's own x axis to each of its sides
+TURNS = {side: k * 0.5 * math.pi for k, side in enumerate(("+x", "+y", "-x", "-y"))}
 
 # What is held pushes with its middle where it can: higher up, it tilts in the hand.
 SPARE = 0.002  # m, over the height from which on a thing is held
@@ -54,24 +56,26 @@ def make_sides(scene_of: Callable[[State], ContactScene]) -> Sides:
             return ()
         body = next((body for body in scene_of(state).free if body.name == obj.name), None)
         yaw, own = yaw_of(state, obj), conjugate(pose_of(state, obj).quaternion)
-        level = [(math.cos(yaw + turn), math.sin(yaw + turn), 0.0) for turn in TURNS]
+        level = {
+            side: (math.cos(yaw + turn), math.sin(yaw + turn), 0.0) for side, turn in TURNS.items()
+        }
         found = []
-        for outwards in (UP, *level):
+        for side, outwards in {ABOVE: UP, **level}.items():
             extent = 0.0 if body is None else body.extent(rotate(own, outwards))
-            found.append(_side(state, obj, outwards, extent + DISTANCE))
+            found.append(_side(state, obj, side, outwards, extent + DISTANCE))
         return tuple(found)
 
     return sides
 
 
-def _side(state: State, obj: Object, outwards: Vector, away: float) -> SideApproach:
+def _side(state: State, obj: Object, side: str, outwards: Vector, away: float) -> SideApproach:
     point = grips(state.alone(), Column.of(obj))[0, 0]
     x, y, z = (point + away * np.array(outwards)).tolist()
     _, yaw = hand_target(state)
     goal = HandGoal((x, y, max(z, _lowest(state))), yaw)
     onwards = np.zeros(len(ACTION_SPACE.axes))  # it does not turn, and the gripper stays as it is
     onwards[:3] = -MAX_SHIFT * np.array(outwards) / np.abs(outwards).max()
-    return SideApproach(follow(*over(state, goal), Move(goal)), onwards)
+    return SideApproach(follow(*over(state, goal), Move(goal)), onwards, side)
 
 
 def _lowest(state: State) -> float:
