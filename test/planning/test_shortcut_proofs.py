@@ -27,6 +27,7 @@ from slap_ros.planning.shortcut_ends import ShortcutEnds
 from slap_ros.relational import GroundOperator, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
+from support.marks import slow
 from test.planning.test_anytime_made_up import LIFTED, WORLD, MadeUpModel, Skill, made_up, plan
 from test.planning.test_proofs import made_up_hand
 
@@ -390,3 +391,32 @@ def test_edges_of_shipped_shortcuts_are_among_their_ends(name, preset, least):
     start, goal = space.abstract(task.initial_state), space.mask(task.goal)
     edges, _ = check_ends(problem, known, start, goal)
     assert edges >= least
+
+
+@pytest.mark.parametrize(
+    ("preset", "seed"),
+    [("fair:obstacles=1", 300), ("fair:obstacles=2", 301), *slow(("fair", 300))],
+)
+def test_no_exhaustive_search_of_a_tower_finds_less_than_is_proven(preset, seed, too_large):
+    domain = get_domain("obstacle_tower", preset)
+    task = domain.task(seed)
+    problem = Problem.of(domain, task.initial_state)
+    known = GroundedShortcuts(domain, chosen_library("", domain).shortcuts, task.initial_state)
+    goal = problem.model.space.mask(task.goal)
+    found = AnytimePlanner(problem, known).plan(task.initial_state, goal)
+    whole = GraphPlanner(problem, search=search_exhaustively, shortcuts=known)
+    exhaustive = whole.plan(task.initial_state, goal)
+    assert 0.9 * exhaustive.steps <= found.at_least <= exhaustive.steps
+
+
+@pytest.mark.parametrize("preset", ["fair:obstacles=8", "fair:distractors=8"])
+def test_full_tables_are_planned_for_with_shortcuts_until_a_plan_is_good_enough(preset):
+    domain = get_domain("obstacle_tower", preset)
+    task = domain.task(300)
+    problem = Problem.of(domain, task.initial_state)
+    known = GroundedShortcuts(domain, chosen_library("", domain).shortcuts, task.initial_state)
+    goal = problem.model.space.mask(task.goal)
+    planner = AnytimePlanner(problem, known, Effort(within=1.25))
+    found = planner.plan(task.initial_state, goal)
+    assert found.bound <= 1.25
+    assert problem.model.executed <= 50
