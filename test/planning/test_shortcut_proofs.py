@@ -264,6 +264,15 @@ def with_shortcut(made):
     return make
 
 
+class AttemptsModel(MadeUpModel):
+    """A model in which each attempt of a shortcut ends in another low-level state."""
+
+    def _simulate(self, option, state, target):
+        rollout = super()._simulate(option, state, target)
+        abstract, detail = rollout.final.data
+        return replace(rollout, final=State(WORLD, [abstract, (detail + option.attempt) % 4]))
+
+
 def tower(seed):
     """A made-up tower on the target, and a slap that is faster than taking it down."""
     rng = random.Random(seed)
@@ -280,7 +289,8 @@ def tower(seed):
     begins = sum(map(atoms.held, atoms.blocks))
     shortcuts = WholeShortcuts(skill, atoms.fallen(), atoms.hand(), begins)
     state = State(WORLD, [float(start), 0.0])
-    return Problem(MadeUpModel(), tuple(problem)), shortcuts, state, atoms.on(last, atoms.target)
+    goal = atoms.on(last, atoms.target)
+    return Problem(AttemptsModel(), tuple(problem)), shortcuts, state, goal
 
 
 @pytest.mark.parametrize(
