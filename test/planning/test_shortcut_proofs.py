@@ -403,6 +403,7 @@ def test_edges_of_shipped_shortcuts_are_among_their_ends(name, preset, least):
     assert edges >= least
 
 
+@pytest.mark.timeout(180)  # the slow one searches exhaustively
 @pytest.mark.parametrize(
     ("preset", "seed"),
     [("fair:obstacles=1", 300), ("fair:obstacles=2", 301), *slow(("fair", 300))],
