@@ -7,8 +7,10 @@ the low-level state and the least steps from where it leads; one is rolled out w
 So the order of the best entry is a bound of every plan, at any time. It rises fast at first, since
 skills know more of a state than of any state.
 
-Shortcuts are too many to try: where one may begin, an entry for all of them waits with the bound of
-what is to come, and nothing is proven beyond it.
+Where it is known to which abstract states shortcuts lead (:mod:`~slap_ros.planning.shortcut_ends`),
+they wait as well, and the next attempt of one waits when one has succeeded. Elsewhere, and of those
+that were given up, an entry for all of them waits with the bound of what is to come, and nothing is
+proven beyond it.
 
 Where a plan is good enough that is near the shortest, the search is for both: in turns, the entry
 of the least bound is taken, which proves, and the one from which the shortest plan is expected
@@ -21,7 +23,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import count
@@ -31,6 +33,7 @@ from slap_ros.planning.model import Model
 from slap_ros.planning.options import Option
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.problem import GroundedOptions
+from slap_ros.planning.shortcut_ends import ShortcutEnd
 from slap_ros.relational import State
 
 
@@ -57,7 +60,7 @@ class _Entry:
     f: int  # environment steps of any plan through it, at least
     minus_g: int  # of equal ones, the one that is farther first
     turn: int
-    options: int = field(compare=False)  # from the start to where it leads
+    options: int = field(compare=False)  # operators from the start to where it leads, at most
     abstract: int = field(compare=False)  # where it leads, a mask
     state: State = field(compare=False)  # of the vertex
     option: Option | None = field(compare=False, default=None)
@@ -84,7 +87,7 @@ class ImplicitSearch:
         operators: GroundedOptions,
         goal: int,
         steps_to_come: Callable[[int, int], int | None],
-        shortcuts_may_begin: Callable[[int], bool],
+        shortcut_ends: Callable[[int, int], Sequence[ShortcutEnd] | None] | None,
         most_states: int,
     ) -> None:
         """Prepare the search.
@@ -96,14 +99,15 @@ class ImplicitSearch:
             steps_to_come: Function from an abstract state, and the number of options before it, to
                 environment steps to the goal at least, shortcuts included; None where no plan is
                 through it.
-            shortcuts_may_begin: Function that says whether a shortcut may begin in an abstract
-                state.
+            shortcut_ends: Function from an abstract state, and a number of operators before it, to
+                the ends of shortcuts that begin there; None where that is not known. None, in the
+                place of the function, for pure planning.
             most_states: Largest number of abstract states, each with the options before it, of
                 which the search asks what is to come.
         """
         self._model, self._operators, self._goal = model, operators, goal
         self._steps_to_come = cache(steps_to_come)
-        self._shortcuts_may_begin, self._most_states = shortcuts_may_begin, most_states
+        self._shortcut_ends, self._most_states = shortcut_ends, most_states
         self._start = 0  # abstract state
         self._queue: list[_Entry] = []
         self._promising: list[tuple[float, int, _Entry]] = []  # the same entries, while plans count
@@ -188,7 +192,8 @@ class ImplicitSearch:
         return best.way.plan() if best is not None and is_plan and best.way is not None else None
 
     def _is_goal(self, entry: _Entry) -> bool:
-        return entry.option is None and entry.abstract & self._goal == self._goal
+        is_vertex = entry.option is None and not entry.is_open
+        return is_vertex and entry.abstract & self._goal == self._goal
 
     def _prove_more(self, rollouts: int, enough: int) -> bool:
         """Take the best entry; whether it could be taken, and more need be proven."""
@@ -240,29 +245,71 @@ class ImplicitSearch:
 
     def _expand(self, vertex: _Entry) -> None:
         """Queue what can be done in a vertex, each option with its bound."""
-        if self._shortcuts_may_begin(vertex.abstract):
+        if self._shortcut_ends is not None:
+            self._queue_shortcuts(vertex, self._shortcut_ends(vertex.abstract, vertex.options))
+        before = self._before(vertex)
+        for ground, option in self._operators:
+            if ground.applicable(vertex.abstract):
+                reached = ground.apply(vertex.abstract)
+                if reached not in before:
+                    self._queue_option(vertex, option, reached, vertex.options + 1)
+
+    def _before(self, vertex: _Entry) -> set[int]:
+        """The abstract states on the way to a vertex: no forward edges lead to one of them again.
+
+        None in pure planning, where the depth of the graph says as much.
+        """
+        before: set[int] = set()
+        way = vertex.way if self._shortcut_ends is not None else None
+        while way is not None:
+            before |= {self._start, way.edge.target.required}
+            way = way.before
+        return before
+
+    def _queue_shortcuts(self, vertex: _Entry, ends: Sequence[ShortcutEnd] | None) -> None:
+        """Queue the shortcuts out of a vertex, as one entry where their ends are not known."""
+        if ends is None:
             by_shortcut = self._steps_to_come(vertex.abstract, vertex.options) or 0
             self._put_after(vertex, by_shortcut - vertex.minus_g, is_open=True)
-        for ground, option in self._operators:
-            if not ground.applicable(vertex.abstract):
-                continue
-            reached, options = ground.apply(vertex.abstract), vertex.options + 1
-            to_come = self._steps_to_come(reached, options)
-            if to_come is not None:
-                f = option.least_steps(vertex.state) + to_come - vertex.minus_g
-                leads = {"abstract": reached, "options": options, "to_come": to_come}
-                self._put_after(vertex, f, option=option, **leads)
-                self._queued += 1
+        for end in ends or ():
+            self._queue_option(vertex, end.option, end.abstract, end.depth)
+
+    def _queue_option(self, vertex: _Entry, option: Option, reached: int, options: int) -> None:
+        """Queue an option with its bound, unless no plan is through it.
+
+        Args:
+            vertex: Where it would begin.
+            option: What would be done.
+            reached: Abstract state that it would lead to, a mask.
+            options: Number of operators from the start to there, at most.
+        """
+        to_come = self._steps_to_come(reached, options)
+        if to_come is not None:
+            f = option.least_steps(vertex.state) + to_come - vertex.minus_g
+            leads = {"abstract": reached, "options": options, "to_come": to_come}
+            self._put_after(vertex, f, option=option, **leads)
+            self._queued += 1
 
     def _roll_out(self, entry: _Entry, option: Option) -> None:
-        """Queue where an option leads; where it fails, no plan is through it."""
+        """Queue where an option leads; where it fails, no plan is through it.
+
+        A shortcut that was given up is not tried, so that nothing is known beyond it.
+        """
+        if option.given_up():
+            self._put_after(entry, entry.f, option=None, is_open=True)
+            return
         target = option.target(entry.abstract)
         rollout = self._model.roll_out(option, entry.state, target)
-        if rollout.reached:
-            minus_g = entry.minus_g - rollout.steps
-            f = (self._steps_to_come(entry.abstract, entry.options) or 0) - minus_g
-            way = _PlanPrefix(PlanEdge(option, target, rollout.steps), entry.way)
-            self._put_after(entry, f, minus_g=minus_g, state=rollout.final, option=None, way=way)
+        if not rollout.reached:
+            return
+        to_come = self._steps_to_come(entry.abstract, entry.options) or 0
+        minus_g = entry.minus_g - rollout.steps
+        way = _PlanPrefix(PlanEdge(option, target, rollout.steps), entry.way)
+        reached = {"minus_g": minus_g, "state": rollout.final, "option": None, "way": way}
+        self._put_after(entry, to_come - minus_g, **reached)
+        following = option.next_attempt()
+        if following is not None:  # it takes as long or longer, and ends in another state
+            self._put_after(entry, to_come - minus_g, option=following)
 
     def _put_after(self, entry: _Entry, f: int, **changes: Any) -> None:
         """Queue what comes of an entry; what was proven of that holds for it as well."""

@@ -119,12 +119,14 @@ class PlanImprovement:
                 first = self._find_first()
                 self._prove(0)
                 yield self._result(None, first.graph_nodes, first.graph_edges)
-            if self._is_modest and self._best is not None:
+            if self._is_modest and self._best is not None and self._shortcuts is None:
                 yield from self._good_enough()
             self._limit = self._model.executed + self._effort.rollouts // NEAR_PLANS
         yield from self._around(abstract)
         if self._best is None:
             self._find_first()
+        elif self._is_modest and self._shortcuts is not None:  # they are found best near the start
+            yield from self._good_enough()
 
     def _good_enough(self) -> Iterator[PlanningResult]:
         """Search for plans and proofs in turns, until a plan is good enough."""

@@ -8,17 +8,21 @@ the start says more (:mod:`slap_ros.planning.implicit_search`).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property, reduce
 from operator import or_
 
 from slap_ros.core import ProvingSkill, Skill
+from slap_ros.planning.graph_depth import GraphDepth
 from slap_ros.planning.implicit_search import ImplicitSearch
 from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.model import CountedModel
 from slap_ros.planning.plan import Plan
 from slap_ros.planning.potential import LeastSteps, alternate
 from slap_ros.planning.problem import Problem
+from slap_ros.planning.shortcut_ends import ShortcutEnd, ShortcutEnds
 from slap_ros.planning.shortcut_source import ShortcutSource
 from slap_ros.relational import State
 
@@ -47,6 +51,7 @@ class PlanProof:
         self._state, self._goal, self._most_states = state, goal, most_states
         self._start = problem.model.space.abstract(state)
         self.first_options = 0  # number of options of the plan that the FF heuristic finds
+        self._forget_failures = shortcuts.forget_failures_since_now() if shortcuts else _nothing
 
     def by_landmarks(self) -> int:
         """Environment steps by landmarks of operators and shortcuts alone."""
@@ -59,7 +64,8 @@ class PlanProof:
             rollouts: Number of roll-outs, those of earlier calls among them, at which it stops.
             enough: Environment steps of which no more need be proven.
         """
-        return self._search.at_least(rollouts, enough)
+        with self._failures_apart():
+            return self._search.at_least(rollouts, enough)
 
     def shorter(self, below: int, within: float, rollouts: int) -> Plan | None:
         """A plan that the search meets, which then looks for plans and proofs in turns.
@@ -73,7 +79,8 @@ class PlanProof:
             A plan that is shorter; None where the known one is good enough, or nothing more is
             found: :meth:`by_search` says what is proven by then.
         """
-        return self._search.shorter(below, within, rollouts)
+        with self._failures_apart():
+            return self._search.shorter(below, within, rollouts)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -88,11 +95,31 @@ class PlanProof:
             self._problem.operators,
             self._goal,
             self._steps_to_come,
-            _never if shortcuts is None else shortcuts.may_begin,
+            None if shortcuts is None else self._ends_of(shortcuts),
             self._most_states,
         )
         search.begin(self._state)
         return search
+
+    def _ends_of(
+        self, shortcuts: ShortcutSource
+    ) -> Callable[[int, int], Sequence[ShortcutEnd] | None]:
+        grounds = [ground for ground, _ in self._problem.operators]
+        depths = GraphDepth(
+            self._start, self._goal, grounds, self._fewest_options, self.first_options
+        )
+        return ShortcutEnds(self._problem, shortcuts, self._start, depths).of
+
+    @contextmanager
+    def _failures_apart(self) -> Iterator[None]:
+        """Let failures of shortcuts in proofs not count in searches for plans, and vice versa."""
+        shortcuts = self._shortcuts
+        forget_mine = shortcuts.forget_failures_since_now() if shortcuts else _nothing
+        self._forget_failures()
+        try:
+            yield
+        finally:
+            forget_mine()
 
     def _steps_to_come(self, abstract: int, options: int) -> int | None:
         """See :class:`ImplicitSearch`."""
@@ -189,6 +216,5 @@ def least_steps_in_plans(skill: Skill, initial: State, follows: bool) -> int:
     return skill.least_steps
 
 
-def _never(_: int) -> bool:
-    """No shortcut begins where there are none."""
-    return False
+def _nothing() -> None:
+    """Nothing has failed."""

@@ -11,6 +11,10 @@ from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.graph_beyond import EdgeBeyond
 from slap_ros.planning.landmark_cut import RelaxedOperator
 
+# From an abstract state, what may be added and what is left alone, all masks, to where all has
+# changed that may; None where that is not known (LargestChange).
+Largest = Callable[[int, int, int], int | None]
+
 
 class ShortcutSource(Protocol):
     """Gives shortcut edges for an abstract graph."""
@@ -34,6 +38,19 @@ class ShortcutSource(Protocol):
 
     def may_begin(self, abstract: int) -> bool:
         """Whether one of the shortcuts may begin in an abstract state, a mask."""
+        ...
+
+    def whole_changes(self, abstract: int, largest: Largest) -> Sequence[EdgeBeyond] | None:
+        """The edges out of an abstract state in a graph that has the largest changes.
+
+        Args:
+            abstract: Abstract state in which shortcuts begin, a mask.
+            largest: Function that gives the largest change of a shortcut; see :data:`Largest`.
+
+        Returns:
+            An edge at most for each shortcut, with the source 0; None where other changes may be
+            edges as well.
+        """
         ...
 
     def forget_failures_since_now(self) -> Callable[[], None]:

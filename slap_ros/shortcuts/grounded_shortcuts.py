@@ -12,6 +12,7 @@ from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.graph_beyond import EdgeBeyond
 from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.options import Option, OptionKind
+from slap_ros.planning.shortcut_source import Largest
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import Object, State, Target
 from slap_ros.shortcuts.ground_shortcut import GroundShortcut, least_steps
@@ -84,6 +85,23 @@ class GroundedShortcuts:
     def may_begin(self, abstract: int) -> bool:
         """See :class:`~slap_ros.planning.shortcut_source.ShortcutSource`."""
         return any(matcher.may_begin(abstract) for matcher in self._matchers)
+
+    def whole_changes(self, abstract: int, largest: Largest) -> list[EdgeBeyond] | None:
+        """See :class:`~slap_ros.planning.shortcut_source.ShortcutSource`."""
+        found = []
+        for shortcut, matcher in zip(self.shortcuts, self._matchers, strict=True):
+            if not matcher.may_begin(abstract):
+                continue
+            target = largest(abstract, matcher.may_be_added, matcher.left_alone)
+            if target is None:
+                return None
+            change = Change.between(abstract, target)
+            if matcher.matches(abstract, target):
+                make_option = partial(self._option, shortcut, change)
+                found.append(EdgeBeyond(0, target, make_option))
+            elif shortcut.signature.may_match_part(change, self._space):
+                return None
+        return found
 
     def forget_failures_since_now(self) -> Callable[[], None]:
         """See :class:`~slap_ros.planning.shortcut_source.ShortcutSource`."""

@@ -306,6 +306,22 @@ class Signature:
             return None
         return [_already_so(pattern, mine, space) for pattern in self.patterns - found]
 
+    def may_match_part(self, change: Change, space: AtomSpace) -> bool:
+        """Whether the signature may match a part of a change, from some source.
+
+        Args:
+            change: Change that adds no atoms but those of patterns.
+            space: Atoms of the task.
+        """
+        kind, found = kinds(space), set()
+        mine: set[Kind] = set()
+        for sign, atom in change.atoms(space):
+            pattern = (sign, atom.predicate.name, tuple(kind[obj] for obj in atom.objects))
+            if pattern in self.patterns:
+                found.add(pattern)
+                mine.update(pattern[2])
+        return mine == set(self.roles) and _signs(found) == _signs(self.patterns)
+
     def _counts_fit(self, change: Change, space: AtomSpace) -> bool:
         """Whether a change adds and deletes as many atoms, about as many objects of each kind."""
         kind = kinds(space)

@@ -37,7 +37,7 @@ class SignatureMatcher:
         ]
         self._conditions: dict[Change, Sequence[tuple[int, int]] | None] = {}
         kind = kinds(space)
-        self._left_alone = ~space.mask(
+        self.left_alone = ~space.mask(
             atom for atom in space.atoms if all(kind[o] in signature.slots for o in atom.objects)
         )
 
@@ -54,18 +54,18 @@ class SignatureMatcher:
         """
         alike: dict[int, list[int]] = {}
         for i, node in enumerate(nodes):
-            alike.setdefault(node & self._left_alone, []).append(i)
+            alike.setdefault(node & self.left_alone, []).append(i)
         for group in alike.values():
             for number, i in enumerate(group):
                 if self.may_begin(nodes[i]):
-                    yield i, [j for j in group[number + 1 :] if self._matches(nodes[i], nodes[j])]
+                    yield i, [j for j in group[number + 1 :] if self.matches(nodes[i], nodes[j])]
 
     def targets(self, nodes: Sequence[int], source: int) -> list[int]:
         """The indices of the later nodes that a shortcut may reach from the node ``source``."""
         if not self.may_begin(nodes[source]):
             return []
         later = range(source + 1, len(nodes))
-        matching = [j for j in later if self._matches(nodes[source], nodes[j])]
+        matching = [j for j in later if self.matches(nodes[source], nodes[j])]
         return self._maximal(nodes, source, matching)
 
     def may_begin(self, source: int) -> bool:
@@ -85,10 +85,11 @@ class SignatureMatcher:
             if not any(_is_part(change, other) for other in changes)
         ]
 
-    def _matches(self, source: int, target: int) -> bool:
+    def matches(self, source: int, target: int) -> bool:
+        """Whether a shortcut that may begin in the source may lead to the target, both masks."""
         add, delete = target & ~source, source & ~target  # masks first: most pairs end here
         return (
-            not (add | delete) & self._left_alone
+            not (add | delete) & self.left_alone
             and not add & ~self.may_be_added
             and bool(add) == self._adds_some
             and bool(delete & self._may_be_deleted) == self._deletes_some

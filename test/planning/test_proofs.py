@@ -9,8 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slap_ros.domains import get_domain
-from slap_ros.errors import PlanningLimitError
-from slap_ros.planning import anytime
 from slap_ros.planning.anytime import AnytimePlanner
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.graph_planner import GraphPlanner
@@ -36,19 +34,6 @@ NOT_ALTERNATING = (
     1389,
 )  # where some plan is longer than the graph is deep
 MASKS = st.sets(st.integers(0, 4), max_size=2).map(lambda bits: sum(1 << bit for bit in bits))
-
-
-@pytest.fixture
-def too_large(monkeypatch):
-    """Any graph is too large for the anytime planner, and it has all of its effort."""
-    whole = anytime.GraphPlanner.graph
-
-    def none(planner, *arguments):
-        if planner.max_nodes == GraphPlanner(planner.problem).max_nodes:
-            return whole(planner, *arguments)
-        raise PlanningLimitError("too large")
-
-    monkeypatch.setattr(anytime.GraphPlanner, "graph", none)
 
 
 @st.composite
