@@ -257,7 +257,7 @@ class ImplicitSearch:
     def _before(self, vertex: _Entry) -> set[int]:
         """The abstract states on the way to a vertex: no forward edges lead to one of them again.
 
-        None in pure planning, where the depth of the graph says as much.
+        Not looked for in pure planning, where the depth of the graph says as much.
         """
         before: set[int] = set()
         way = vertex.way if self._shortcut_ends is not None else None

@@ -104,9 +104,12 @@ class PlanProof:
     def _ends_of(
         self, shortcuts: ShortcutSource
     ) -> Callable[[int, int], Sequence[ShortcutEnd] | None]:
-        grounds = [ground for ground, _ in self._problem.operators]
         depths = GraphDepth(
-            self._start, self._goal, grounds, self._fewest_options, self.first_options
+            self._start,
+            self._goal,
+            self._problem.grounds,
+            self._fewest_options,
+            self.first_options,
         )
         return ShortcutEnds(self._problem, shortcuts, self._start, depths).of
 

@@ -50,7 +50,7 @@ class ShortcutEnds:
         """
         self._shortcuts, self._start, self._depths = shortcuts, start, depths
         self._exact = problem.exact  # else more atoms may hold than those of a node
-        self._largest = LargestChange(start, [ground for ground, _ in problem.operators])
+        self._largest = LargestChange(start, problem.grounds)
 
     def of(self, abstract: int, depth: int) -> Sequence[ShortcutEnd] | None:
         """All ends of shortcuts that begin in a node and may be on a way to the goal.
