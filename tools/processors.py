@@ -115,7 +115,7 @@ RECORDED_RUN = _bag_figure("obstacle2d", "--seed", "1")
 FIGURES = (
     PLAN,
     _json_figure("plan", "cluttered_drawer", "--seed", "1"),
-    _json_figure("plan", "cleanup_table", "--seed", "1"),
+    _json_figure("plan", "cleanup_table", "--preset", "fair:toys=6", "--seed", "502"),
     _json_figure("evaluate", "obstacle2d", "--tasks", "5", "--seeds", "2"),
     _json_figure("evaluate", "obstacle_tower", "--tasks", "3", "--seeds", "1"),
     RECORDED_RUN,

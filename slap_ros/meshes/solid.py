@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from slap_ros.errors import InvalidMeshError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
+from slap_ros.meshes.determinants import determinants
 
 Array = NDArray[np.float64]
 FLAT = 1e-3  # m, by which points of a face may be off its plane
@@ -132,7 +133,7 @@ class Solid:
 
     def extent(self, axis: Vector) -> float:
         """How far the solid reaches from its centre of mass along an axis, to either side, m."""
-        return float(np.abs(self.points @ np.array(axis)).max())
+        return float(np.abs(_along(self.points, axis)).max())
 
     def stands_on(self, down: Vector) -> bool:
         """Whether it stands on a plane without turning: on points all around its middle.
@@ -140,7 +141,7 @@ class Solid:
         Args:
             down: Unit vector along an axis of its own, to where it would stand.
         """
-        depths = self.points @ np.array(down)
+        depths = _along(self.points, down)
         lowest = self.points[depths > depths.max() - FLAT]
         x, y = (lowest[:, axis] for axis in range(3) if down[axis] == 0.0)
         angles = np.sort(np.arctan2(y, x))
@@ -177,6 +178,13 @@ class Solid:
         return hash(self.digest)
 
 
+def _along(vectors: Array, axis: Vector) -> Array:
+    """The products of vectors, shape (n, 3), with an axis: the same bits on every processor."""
+    x, y, z = axis
+    products: Array = vectors[:, 0] * x + vectors[:, 1] * y + vectors[:, 2] * z
+    return products
+
+
 def _corners(piece: ConvexPiece) -> Array:
     """The corners of each triangle, shape (triangles, 3, 3)."""
     corners: Array = np.array(piece.vertices)[np.array(piece.triangles, dtype=np.intp)]
@@ -186,7 +194,7 @@ def _corners(piece: ConvexPiece) -> Array:
 def _moments(piece: ConvexPiece) -> tuple[float, Array, Array]:
     """Volume in m³; first moments in m⁴; second moments xx, yy, zz in m⁵: of tetrahedra summed."""
     corners = _corners(piece)
-    volumes = np.linalg.det(corners) / 6.0  # of the tetrahedra from the origin
+    volumes = determinants(corners) / 6.0  # of the tetrahedra from the origin
     sums = corners.sum(1)
     firsts = (volumes[:, None] * sums).sum(0) / 4.0
     squares = np.square(sums) + np.square(corners).sum(1)
@@ -208,7 +216,7 @@ def _inside(piece: ConvexPiece) -> OrientedBox:
     centre = firsts / volume
     half = np.array(_around(np.array(piece.vertices)).half)
     room = ((corners[:, 0] - centre) * normals).sum(1)  # to each face, times its normal's length
-    share = max(0.0, float((room / (np.abs(normals) @ half)).min()))
+    share = max(0.0, float((room / _along(np.abs(normals), half.tolist())).min()))
     x, y, z = centre.tolist()
     u, v, w = (share * half).tolist()
     return OrientedBox(Pose((x, y, z)), (u, v, w))
