@@ -21,6 +21,7 @@ from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.determinants import determinants
 
 Array = NDArray[np.float64]
+Moments = tuple[float, Array, Array]  # see _moments
 FLAT = 1e-3  # m, by which points of a face may be off its plane
 LEAST_VOLUME = 1e-12  # m³: a cube of a tenth of a millimetre
 
@@ -89,15 +90,16 @@ class Solid:
         """
         if not pieces:
             raise InvalidMeshError("a solid needs at least one piece")
+        moments = []
         for number, piece in enumerate(pieces, start=1):
             if not np.isfinite(piece.vertices).all():
                 raise InvalidMeshError(f"piece {number} has vertices that are not finite")
-            if not piece.triangles or _moments(piece)[0] < LEAST_VOLUME:
+            if not piece.triangles or (found := _moments(piece))[0] < LEAST_VOLUME:
                 raise InvalidMeshError(
                     f"piece {number} encloses no volume; are its triangles anticlockwise, seen "
                     "from outside, and its lengths in metres?"
                 )
-        moments = [_moments(piece) for piece in pieces]
+            moments.append(found)
         cx, cy, cz = (np.sum([m[1] for m in moments], 0) / sum(m[0] for m in moments)).tolist()
         return Solid(
             tuple(
@@ -151,14 +153,18 @@ class Solid:
     @cached_property
     def inertia(self) -> Vector:
         """Moments about the solid's own axes for a mass of 1 kg, m²; no products of inertia."""
-        moments = [_moments(piece) for piece in self.pieces]
+        moments = self._moments
         xx, yy, zz = (np.sum([m[2] for m in moments], 0) / sum(m[0] for m in moments)).tolist()
         return (yy + zz, xx + zz, xx + yy)
 
     @cached_property
     def cores(self) -> tuple[OrientedBox, ...]:
         """A box inside each piece: what enters it surely enters the solid."""
-        return tuple(map(_inside, self.pieces))
+        return tuple(map(_inside, self.pieces, self._moments))
+
+    @cached_property
+    def _moments(self) -> Sequence[Moments]:
+        return tuple(map(_moments, self.pieces))
 
     @cached_property
     def digest(self) -> bytes:
@@ -191,7 +197,7 @@ def _corners(piece: ConvexPiece) -> Array:
     return corners
 
 
-def _moments(piece: ConvexPiece) -> tuple[float, Array, Array]:
+def _moments(piece: ConvexPiece) -> Moments:
     """Volume in m³; first moments in m⁴; second moments xx, yy, zz in m⁵: of tetrahedra summed."""
     corners = _corners(piece)
     volumes = determinants(corners) / 6.0  # of the tetrahedra from the origin
@@ -208,11 +214,11 @@ def _around(points: Array) -> OrientedBox:
     return OrientedBox(Pose((x, y, z)), (u, v, w))
 
 
-def _inside(piece: ConvexPiece) -> OrientedBox:
+def _inside(piece: ConvexPiece, moments: Moments) -> OrientedBox:
     """The box around a piece, shrunk about the piece's centre until it is inside."""
     corners = _corners(piece)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    volume, firsts, _ = _moments(piece)
+    volume, firsts, _ = moments
     centre = firsts / volume
     half = np.array(_around(np.array(piece.vertices)).half)
     room = ((corners[:, 0] - centre) * normals).sum(1)  # to each face, times its normal's length
