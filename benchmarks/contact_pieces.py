@@ -35,7 +35,7 @@ from slap_ros.worlds.contact import dynamics, simulation
 from slap_ros.worlds.contact.contacts import Side
 from slap_ros.worlds.contact.hand import hand_at
 from slap_ros.worlds.contact.hand_model import QUICK
-from slap_ros.worlds.contact.simulation_pool import close_idle
+from slap_ros.worlds.contact.simulation import SIMULATIONS
 from slap_ros.worlds.contact.world import ContactWorld
 
 COUNT = 20  # grasps of each
@@ -47,13 +47,13 @@ Figures = dict[str, float]
 def without(owner: Any, name: str, instead: Any) -> Iterator[None]:
     """Run with everything as it is but for one piece, in simulations of its own."""
     was = getattr(owner, name)
-    close_idle()
+    SIMULATIONS.forget()
     setattr(owner, name, instead)
     try:
         yield
     finally:
         setattr(owner, name, was)
-        close_idle()
+        SIMULATIONS.forget()
 
 
 def impure() -> Figures:

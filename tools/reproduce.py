@@ -78,7 +78,12 @@ class Figure:
 
     @property
     def baselines(self) -> list[dict[str, Any]]:
-        """What the figure says of the baselines that it compares with, where they are missing."""
+        """What the figure says of the baselines that it compares with, where they are missing.
+
+        A command that names none compares with those that ship.
+        """
+        if "--against" not in shlex.split(self.command):
+            return []
         rows = self.found.get("rows", ()) if isinstance(self.found, dict) else ()
         trained = [one for row in rows for one in row.get("trained", ())]
         return [one for one in trained if not (Path(BASELINES) / one["name"]).is_dir()]

@@ -11,6 +11,7 @@ from slap_ros.api.left_out import Tell
 from slap_ros.baselines.trained_baseline import TrainedBaseline, load_baseline
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
+from slap_ros.policies.shipped_models import shipped_folder
 
 BASELINES = "runs/baselines"
 
@@ -18,6 +19,12 @@ BASELINES = "runs/baselines"
 def baselines_in_runs(domain: str) -> list[Path]:
     """The baselines of a domain in the folder in which they are by default."""
     return sorted(path.parent for path in Path(BASELINES).glob(f"{domain}-*/baseline.json"))
+
+
+def shipped_baselines(domain: str) -> list[Path]:
+    """The baselines that ship for a domain, by method and seed; none for most domains."""
+    folder = shipped_folder("baselines", domain)
+    return [] if folder is None else sorted(path.parent for path in folder.glob("*/baseline.json"))
 
 
 def open_baselines(

@@ -1,28 +1,24 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What simulated worlds share: a scene, a state, and a simulation that they borrow."""
+"""What simulated worlds have in common: a scene, a state, and when they are closed."""
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Callable
 from typing import Generic, Self, TypeVar
 
 from slap_ros.errors import InvalidStateError
 from slap_ros.relational import Layout, State
 
 SceneType = TypeVar("SceneType")
-Borrowed = TypeVar("Borrowed")
 
 
 class SimulatedWorld(Generic[SceneType]):
-    """A world of a scene. Closed, or no longer referred to, it gives its simulation back."""
+    """A world of a scene, whose simulation it shares with other worlds of that scene."""
 
     _state: State  # set by the world that this is a part of
-    _closing: weakref.finalize[..., SimulatedWorld[SceneType]]
 
     def __init__(self, scene: SceneType, layout: Layout) -> None:
-        """Begin without a simulation.
+        """Begin without a state.
 
         Args:
             scene: Bodies of this world.
@@ -30,6 +26,7 @@ class SimulatedWorld(Generic[SceneType]):
         """
         self._scene = scene
         self._layout = layout
+        self._is_open = True
 
     def __enter__(self) -> Self:
         return self
@@ -38,8 +35,8 @@ class SimulatedWorld(Generic[SceneType]):
         self.close()
 
     def close(self) -> None:
-        """Give the simulation back; the world cannot be stepped any more."""
-        self._closing()
+        """The world cannot be stepped any more."""
+        self._is_open = False
 
     @property
     def scene(self) -> SceneType:
@@ -51,14 +48,10 @@ class SimulatedWorld(Generic[SceneType]):
         """The current state, all that the next step depends on."""
         return self._state
 
-    def _give_back(self, simulation: Borrowed, release: Callable[[Borrowed], None]) -> None:
-        """See that a simulation is released when the world is closed or collected."""
-        self._closing = weakref.finalize(self, release, simulation)
-
     def _require_own_objects(self, state: State) -> None:
         if state.layout is not self._layout and state.layout != self._layout:
             raise InvalidStateError("a world is reset to states of its own objects only")
 
     def _require_open(self) -> None:
-        if not self._closing.alive:
+        if not self._is_open:
             raise ValueError("this world is closed")

@@ -28,13 +28,13 @@ from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStat
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import State
 from slap_ros.worlds.bullet import pybullet
-from slap_ros.worlds.contact import simulation_pool
 from slap_ros.worlds.contact.arm import MAX_JOINT_STEP
 from slap_ros.worlds.contact.contacts import Side
 from slap_ros.worlds.contact.features import robot_features
 from slap_ros.worlds.contact.hand import LEASH, hand_at
 from slap_ros.worlds.contact.hand_model import HandModel
 from slap_ros.worlds.contact.scene import TABLE, ContactScene, box, cylinder
+from slap_ros.worlds.contact.simulation import SIMULATIONS
 from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, grasp_pose
 from support.states import changed
@@ -359,16 +359,16 @@ def test_every_state_that_a_world_makes_is_accepted():
 # -- clients ----------------------------------------------------------------------------------
 
 
-def test_worlds_give_their_clients_back():
-    simulation_pool.close_idle()
+def test_worlds_of_a_scene_share_a_client_that_goes_with_them():
+    SIMULATIONS.forget()
     worlds = [ContactWorld(LOOSE, start(scene=LOOSE)) for _ in range(3)]
-    first = worlds[0]._dynamics._simulation
-    first_id = id(first)
+    (client,) = {world._dynamics._simulation.client for world in worlds}
     worlds[0].close()
-    again = ContactWorld(LOOSE, start(scene=LOOSE))
-    assert id(again._dynamics._simulation) == first_id
     with pytest.raises(ValueError, match="closed"):
         worlds[0].step(STAY)
-    del worlds, again
+    SIMULATIONS.forget()
+    worlds[1].step(STAY)  # those that are there go on
+    assert pybullet.isConnected(client)
+    del worlds
     gc.collect()
-    simulation_pool.close_idle()
+    assert not pybullet.isConnected(client)

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.workbench import BENCH, start
 from slap_ros.relational import State
-from slap_ros.worlds.contact.simulation_pool import close_idle
+from slap_ros.worlds.contact.simulation import SIMULATIONS
 from slap_ros.worlds.contact.world import ContactWorld
 from support.contact_transitions import Transitions, record
 from support.marks import slow
@@ -27,7 +27,7 @@ def recorded() -> Transitions:
 
 @pytest.fixture
 def world():
-    close_idle()  # a new PyBullet client for each order
+    SIMULATIONS.forget()  # a new PyBullet client for each order
     with ContactWorld(BENCH, start()) as world:
         yield world
 
@@ -62,7 +62,7 @@ def test_the_same_in_any_order(recorded, world, order):
 @pytest.mark.slow
 def test_the_same_in_worlds_of_their_own(recorded):
     for i in range(0, COUNT, 6):
-        close_idle()
+        SIMULATIONS.forget()
         with ContactWorld(BENCH, start()) as world:
             assert recorded.differing(world, [i]) == []
 

@@ -14,7 +14,7 @@ from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State, Type
 from slap_ros.worlds.features import POSE_FEATURES, pose_features
 from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene
-from slap_ros.worlds.joint_space.simulation_pool import close_idle
+from slap_ros.worlds.joint_space.simulation import SIMULATIONS
 from slap_ros.worlds.joint_space.world import PandaWorld
 from support.marks import slow
 from support.programs import environment, program
@@ -61,7 +61,7 @@ def test_the_same_after_any_other_history(transitions, world):
 
 def test_the_same_in_fresh_worlds(transitions):
     for i in range(0, len(transitions.before), 50):
-        close_idle()  # a new PyBullet client each time
+        SIMULATIONS.forget()  # a new PyBullet client each time
         with PandaWorld(transitions.scene, transitions.start) as world:
             assert transitions.differing(world, [i]) == []
 

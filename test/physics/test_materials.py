@@ -12,8 +12,7 @@ from slap_ros.errors import InvalidStateError
 from slap_ros.relational import State
 from slap_ros.worlds.bodies import Material
 from slap_ros.worlds.joint_space.scene import CUBE_MATERIAL, REFERENCE_FRICTION, TABLE, Scene, cube
-from slap_ros.worlds.joint_space.simulation import GRAVITY
-from slap_ros.worlds.joint_space.simulation_pool import close_idle
+from slap_ros.worlds.joint_space.simulation import GRAVITY, SIMULATIONS
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import HOME
 from support.materials import tower_of
@@ -103,7 +102,7 @@ def test_a_world_takes_on_the_masses_and_frictions_of_each_state(world):
     states = [shoved(0.2, 0.3), shoved(0.7, 3.0), shoved(0.9, 0.5), shoved(0.2, 0.1)]
     fresh = []
     for state in states:
-        close_idle()
+        SIMULATIONS.forget()
         with PandaWorld(SCENE, state) as other:
             fresh.append(steps(other, state, 6))
     assert len({state.key for state in fresh}) == len(states)

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The world: limits, refused steps, grasping, impossible scenes, simulations used again."""
+"""The world: limits, refused steps, grasping, impossible scenes, simulations shared."""
 
 from __future__ import annotations
 
 import gc
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -15,10 +17,10 @@ from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State, Type
 from slap_ros.worlds.bullet import pybullet
 from slap_ros.worlds.features import body_features
-from slap_ros.worlds.joint_space import simulation_pool
 from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Surroundings, Sweep
 from slap_ros.worlds.joint_space.features import ROBOT, robot_features
 from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene, cube
+from slap_ros.worlds.joint_space.simulation import SIMULATIONS
 from slap_ros.worlds.joint_space.world import ACTION_SPACE, PandaWorld
 from slap_ros.worlds.panda import (
     FINGER_OPEN,
@@ -29,7 +31,7 @@ from slap_ros.worlds.panda import (
     grasp_pose,
     hand_pose,
 )
-from slap_ros.worlds.simulation_pool import MAX_IDLE
+from slap_ros.worlds.shared_simulations import MOST_KEPT
 from support.states import changed
 from support.transitions import HIGH, holding
 
@@ -367,36 +369,59 @@ def test_a_scene_without_free_bodies():
         assert joints(world.step(HIGH))[0] == pytest.approx(HOME[0] + MAX_STEP[0])
 
 
-# -- simulations used again ------------------------------------------------------------------------
+# -- simulations shared ------------------------------------------------------------------------
 
 
 def connected() -> int:
     return sum(bool(pybullet.isConnected(client)) for client in range(64))
 
 
-def test_ten_worlds_made_and_closed_leak_no_clients():
-    simulation_pool.close_idle()
+def test_ten_worlds_of_a_scene_share_a_client():
+    SIMULATIONS.forget()
     before = connected()
     worlds = [PandaWorld(SCENE, tower()) for _ in range(10)]
-    assert connected() == before + 10
+    assert connected() == before + 1
     states = [world.step(HIGH * (i % 2)) for i, world in enumerate(worlds)]  # all at once
     assert states[2] == states[4] != states[3] == states[5]
-    for world in worlds:
-        world.close()
-    assert connected() == before + MAX_IDLE
-    simulation_pool.close_idle()
-    assert connected() == before
-
-
-def test_a_world_that_nobody_refers_to_gives_its_client_back():
-    simulation_pool.close_idle()
-    before = connected()
-    for _ in range(10):
-        PandaWorld(SCENE, tower()).step(STAY)
+    del worlds
     gc.collect()
-    assert connected() == before + 1  # the same one every time
-    simulation_pool.close_idle()
+    assert connected() == before + 1  # kept for the next world of this scene
+    SIMULATIONS.forget()
     assert connected() == before
+
+
+def test_worlds_of_many_scenes_leak_no_clients():
+    SIMULATIONS.forget()
+    before = connected()
+    scenes = [Scene((*SCENE.bodies, small(i))) for i in range(2 * MOST_KEPT)]
+    for scene in scenes:
+        PandaWorld(scene, tower()).step(STAY)
+    gc.collect()
+    assert connected() == before + MOST_KEPT
+    SIMULATIONS.forget()
+    assert connected() == before
+
+
+def test_worlds_of_several_threads_come_to_the_same_states():
+    script = pushes(4, seed=1)
+    alone = list(map(pushed, script))
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)  # s: threads take turns within a step
+    try:
+        with ThreadPoolExecutor(len(script)) as threads:
+            together = list(threads.map(pushed, script))
+    finally:
+        sys.setswitchinterval(interval)
+    assert together == alone
+
+
+def pushed(push):
+    with PandaWorld(SCENE, with_joints(tower(), push.joints)) as world:
+        return [world.step(action) for action in push.actions]
+
+
+def small(i):
+    return Box("extra", (0.01, 0.01, 0.01), pose=Pose((-0.5, 0.1 * i, 0.5)))
 
 
 def test_a_closed_world_cannot_be_stepped():
@@ -408,7 +433,7 @@ def test_a_closed_world_cannot_be_stepped():
 
 
 def test_a_refused_state_takes_no_client():
-    simulation_pool.close_idle()
+    SIMULATIONS.forget()
     before = connected()
     with pytest.raises(InvalidStateError):
         PandaWorld(SCENE, changed(tower(), "T", z=0.0))

@@ -21,7 +21,7 @@ from slap_ros.domain_check.experience import Transition, gather
 from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
-from slap_ros.worlds.contact.simulation_pool import close_idle
+from slap_ros.worlds.contact.simulation import SIMULATIONS
 
 SHUFFLES = 3
 
@@ -48,7 +48,7 @@ def record(name: str, count: int) -> tuple[Transition, ...]:
 def differing(name: str, steps: Iterable[Transition]) -> int:
     """How many steps come out differently, in any bit, one after the other in a fresh world."""
     steps = list(steps)
-    close_idle()  # a new PyBullet client
+    SIMULATIONS.forget()  # a new PyBullet client
     with demonstrator_of(name).make_world(steps[0].state) as world:
         count = 0
         for step in steps:

@@ -76,7 +76,7 @@ class SkillTrials:
         for number, initiation in enumerate(self._initiations):
             by_layout.setdefault(initiation.state.layout, []).append(number)
         for numbers in by_layout.values():
-            worlds: list[World] = []  # given back with the last: a simulation takes 36 MB
+            worlds: list[World] = []  # reset to the states that come next
             for i in range(0, len(numbers), SIDE_BY_SIDE):
                 some = numbers[i : i + SIDE_BY_SIDE]
                 yield from zip(some, self._run(some, act, worlds), strict=True)

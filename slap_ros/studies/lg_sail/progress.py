@@ -36,7 +36,12 @@ from slap_ros.studies.lg_sail.library_progress import PAPER_PROGRESS, of_library
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
-from slap_ros.studies.trained_baselines import BASELINES, baselines_in_runs, open_baselines
+from slap_ros.studies.trained_baselines import (
+    BASELINES,
+    baselines_in_runs,
+    open_baselines,
+    shipped_baselines,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -348,8 +353,8 @@ class ProgressOptions:
         list[Path] | None,
         CommandOption(
             "Folder of a baseline with the reward `stages` that `slap baseline train` made. May be "
-            "repeated: trainings of the same method share a row. Default: all of "
-            f"{BASELINES}/DOMAIN-*.",
+            "repeated: trainings of the same method share a row. Default: all that ship, or else "
+            f"all of {BASELINES}/DOMAIN-*.",
             metavar="FOLDER",
         ),
     ] = None
@@ -371,7 +376,8 @@ def prepare(options: ProgressOptions, tell: Tell) -> PreparedStudy:
     domain = get_domain(options.domain, options.preset)
     libraries = options.library or shipped_skills(options.domain)
     choices = [DomainChoice(domain.name, domain.preset, str(folder)) for folder in libraries]
-    folders = options.against or baselines_in_runs(domain.name)
+    shipped = shipped_baselines(domain.name)
+    folders = options.against or shipped or baselines_in_runs(domain.name)
     baselines = open_baselines(folders, domain, lambda one: _why_not(one, domain.preset), tell)
     if not baselines:
         raise InvalidParameterError(
@@ -390,7 +396,7 @@ def prepare(options: ProgressOptions, tell: Tell) -> PreparedStudy:
         lambda runner: study(domain, choices, baselines, goals, tasks, runner),
         {
             "library": options.library,
-            "against": folders,
+            "against": options.against if shipped else folders,
             "goal": options.goal,
             "trainings": None,
         },

@@ -72,7 +72,6 @@ class ContactDynamics:
 
     def place(self, placement: Placement) -> None:
         """Let the bodies that do not move stand there."""
-        self._simulation.place(placement)
         self._placement = placement
         self._fixed = [
             bounds
@@ -101,7 +100,7 @@ class ContactDynamics:
             alone = own_way(now.hand, pull, self._scene.hand)
             return now._replace(hand=alone, held=None), ()
         while True:
-            outcome = self._simulation.run(now, pull, involved)
+            outcome = self._run(now, pull, involved)
             if not involved.hand:
                 alone = own_way(now.hand, pull, self._scene.hand)
                 outcome = replace(outcome, hand=alone)
@@ -109,6 +108,12 @@ class ContactDynamics:
             if wider == involved:
                 return self._taken_over(now, involved, outcome), outcome.contacts
             involved = wider
+
+    def _run(self, now: ContactSnapshot, pull: Pose, involved: Involved) -> Outcome:
+        """One control period, in the simulation that other worlds use in between."""
+        with self._simulation.lock:
+            self._simulation.place(self._placement)
+            return self._simulation.run(now, pull, involved)
 
     # -- what is involved -----------------------------------------------------------------------
 
@@ -173,7 +178,7 @@ class ContactDynamics:
         stands = self._standing.get(key)
         if stands is None:
             alone = _alone(now, members)
-            outcome = self._simulation.run(alone, SOMEWHERE.pose, Involved(members, hand=False))
+            outcome = self._run(alone, SOMEWHERE.pose, Involved(members, hand=False))
             after = self._results(outcome)
             stands = all(_rests(moving[i], after[i]) for i in members)
             if len(self._standing) == MOST_REMEMBERED:

@@ -39,6 +39,7 @@ from slap_ros.worlds.contact.snapshot import (
 from slap_ros.worlds.contact.urdf import LEFT, MOVING, RIGHT, hand_urdf, jointed_urdf
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
+from slap_ros.worlds.shared_simulations import BulletClient, SharedSimulations
 
 GRAVITY = 9.81  # m/s², downwards
 LIFT = (0.0, 0.0, GRAVITY * MASS)  # N, cancels the hand's weight
@@ -72,7 +73,7 @@ def _parking(index: int) -> Vector:
     return (100.0 + 5.0 * index, 100.0, 1.0)
 
 
-class ContactSimulation:
+class ContactSimulation(BulletClient):
     """A PyBullet client with the hand and the bodies of a scene.
 
     It remembers nothing that matters between calls but where the fixed bodies stand, and which
@@ -80,8 +81,8 @@ class ContactSimulation:
     """
 
     def __init__(self, scene: ContactScene) -> None:
+        super().__init__()
         self.scene = scene
-        self.client: int = pybullet.connect(pybullet.DIRECT)
         pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, self.client)
         pybullet.setPhysicsEngineParameter(
@@ -102,10 +103,6 @@ class ContactSimulation:
         self._free = [self._add_free(i, body) for i, body in enumerate(scene.free)]
         self._jointed = [self._add_jointed(i, body) for i, body in enumerate(scene.jointed)]
         self._awake = set(range(len(self._free) + len(self._jointed)))  # by number, as involved
-
-    def close(self) -> None:
-        """Give the client back."""
-        pybullet.disconnect(self.client)
 
     def place(self, placement: Placement) -> None:
         """Let the bodies that do not move stand there."""
@@ -410,6 +407,11 @@ class ContactSimulation:
     def _next_parking(self) -> Vector:
         self._parked += 1
         return _parking(self._parked)
+
+
+SIMULATIONS: SharedSimulations[ContactScene, ContactSimulation] = SharedSimulations(
+    ContactSimulation
+)
 
 
 def _geometry(part: Part) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from slap_ros.worlds.contact.contacts import ContactPoint
 from slap_ros.worlds.contact.dynamics import ContactDynamics
 from slap_ros.worlds.contact.features import GRIPPER, ROBOT
 from slap_ros.worlds.contact.scene import ContactScene
-from slap_ros.worlds.contact.simulation_pool import acquire, release
+from slap_ros.worlds.contact.simulation import SIMULATIONS
 from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot
 from slap_ros.worlds.contact.validation import require_possible
 from slap_ros.worlds.simulated_world import SimulatedWorld
@@ -58,9 +58,7 @@ class ContactWorld(SimulatedWorld[ContactScene]):
         (robot,) = state.layout.of_type(ROBOT)
         self._gripper = state.layout.column(robot, GRIPPER.name)
         self._require_possible(state)
-        simulation = acquire(scene)
-        self._give_back(simulation, release)
-        self._dynamics = ContactDynamics(scene, simulation)
+        self._dynamics = ContactDynamics(scene, SIMULATIONS.of(scene))
         self._adopt(state)
 
     @property

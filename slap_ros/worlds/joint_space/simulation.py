@@ -29,6 +29,7 @@ from slap_ros.worlds.joint_space.links import LINK_SHAPES
 from slap_ros.worlds.joint_space.scene import REFERENCE_FRICTION, Body, Scene, Shape
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
+from slap_ros.worlds.shared_simulations import BulletClient, SharedSimulations
 
 GRAVITY = 9.81  # m/s², downwards
 DRIVEN_MASS = 1e4  # kg, against which nothing else weighs
@@ -58,7 +59,7 @@ def _solid(shape: Shape) -> Solid:
     return shape if isinstance(shape, Solid) else Solid.of([cuboid(shape)])
 
 
-class Simulation:
+class Simulation(BulletClient):
     """A PyBullet client with the bodies of a scene.
 
     It keeps nothing that matters between calls but where the fixed bodies are and what the
@@ -66,9 +67,9 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, stepping: Stepping) -> None:
+        super().__init__()
         self.scene = scene
         self.stepping = stepping
-        self.client: int = pybullet.connect(pybullet.DIRECT)
         self._fixed_poses: tuple[Pose, ...] = ()
         # Pieces rest on their faces only where both know them; else one point at a time is found
         # in which they touch, and they rock on it. Boxes among themselves need no help.
@@ -86,8 +87,8 @@ class Simulation:
         self._parked = 0
         self._fixed = [self._add_fixed(body) for body in scene.fixed]
         self._free = [self._add_free(body) for body in scene.free]
-        self._materials: list[Material | None] = [None] * len(self._free)
-        self.set_materials([body.material for body in scene.free])
+        self._materials: tuple[Material | None, ...] = (None,) * len(self._free)
+        self.set_materials(tuple(body.material for body in scene.free))
         self._links = [self._add_link(i) for i in range(len(LINK_SHAPES))]
         # A held body is one more link. Bodies of one shape share it, as one is held at a time.
         shapes = dict.fromkeys(body.shape for body in scene.free)
@@ -100,10 +101,6 @@ class Simulation:
         self._free_parking = list(zip(self._free, parking, strict=False))
         self._driven_parking = list(zip(self._driven, parking[len(self._free) :], strict=True))
 
-    def close(self) -> None:
-        """Give the client back."""
-        pybullet.disconnect(self.client)
-
     def place_fixed(self, poses: tuple[Pose, ...]) -> None:
         """Put the scene's fixed bodies there."""
         if poses == self._fixed_poses:
@@ -113,12 +110,14 @@ class Simulation:
             if body is not None:
                 pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
 
-    def set_materials(self, materials: Sequence[Material]) -> None:
+    def set_materials(self, materials: tuple[Material, ...]) -> None:
         """Give the scene's free bodies these masses and frictions.
 
         It has to be told even what a body was created with: PyBullet derives a body's weight in
         other ways at its creation and later, which differ in the last bit.
         """
+        if materials == self._materials:
+            return
         for i, (body, material) in enumerate(zip(self._free, materials, strict=True)):
             if material != self._materials[i]:
                 pybullet.changeDynamics(
@@ -129,7 +128,7 @@ class Simulation:
                     physicsClientId=self.client,
                     **self._inertia(self.scene.free[i].shape, material.mass_kg),
                 )
-                self._materials[i] = material
+        self._materials = materials
 
     def run(
         self,
@@ -297,3 +296,8 @@ class Simulation:
             physicsClientId=self.client,
         )
         return body
+
+
+SIMULATIONS: SharedSimulations[tuple[Scene, Stepping], Simulation] = SharedSimulations(
+    lambda key: Simulation(*key)
+)

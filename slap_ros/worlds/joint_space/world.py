@@ -9,6 +9,7 @@ action, bit for bit (``docs/physics.md`` says how, and what it costs).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from slap_ros.core import Action, ActionSpace, GripperAxis
@@ -24,6 +25,7 @@ from slap_ros.worlds.joint_space.arm import (
     Surroundings,
     Way,
 )
+from slap_ros.worlds.joint_space.drive import Drive
 from slap_ros.worlds.joint_space.gripper import grip
 from slap_ros.worlds.joint_space.raising import (
     MAX_RAISES,
@@ -32,8 +34,7 @@ from slap_ros.worlds.joint_space.raising import (
     within_limits,
 )
 from slap_ros.worlds.joint_space.scene import Scene
-from slap_ros.worlds.joint_space.simulation import Stepping
-from slap_ros.worlds.joint_space.simulation_pool import acquire, release
+from slap_ros.worlds.joint_space.simulation import SIMULATIONS, Stepping
 from slap_ros.worlds.joint_space.snapshot import SceneIndex, Snapshot
 from slap_ros.worlds.joint_space.validation import require_valid
 from slap_ros.worlds.layout_index import BodyState
@@ -96,9 +97,7 @@ class PandaWorld(SimulatedWorld[Scene]):
         self._fixed_poses: tuple[Pose, ...] = ()
         self._obstacles: Surroundings[Obstacle] = Surroundings()
         self._adopt(state)
-        self._simulation = acquire(scene, stepping)
-        self._give_back(self._simulation, release)
-        self._prepare()
+        self._simulation = SIMULATIONS.of((scene, stepping))
 
     def reset(self, state: State) -> None:
         """Continue from ``state``.
@@ -108,12 +107,6 @@ class PandaWorld(SimulatedWorld[Scene]):
         """
         self._require_own_objects(state)
         self._adopt(state)
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Set what the simulation keeps between control periods."""
-        self._simulation.place_fixed(self._fixed_poses)
-        self._simulation.set_materials(self._materials)
 
     def _adopt(self, state: State) -> None:
         state.require_finite()
@@ -233,14 +226,27 @@ class PandaWorld(SimulatedWorld[Scene]):
         bodies, depth = list(now.bodies), 0.0
         loose = [i for i in range(len(bodies)) if i != now.held]
         if not self._undisturbed(now, loose, sweep):
-            after = self._simulation.run(bodies, now.held, sweep.drives())
-            depth = self._simulation.deepest()
+            after, depth = self._run(bodies, now.held, sweep.drives())
             came_to_rest = all(_rests(bodies[i], after[i]) for i in loose)
             for i in loose:
                 bodies[i] = BodyState(bodies[i].pose) if came_to_rest else after[i]
         if now.held is not None:
             bodies[now.held] = BodyState(sweep.end.held_pose)
         return tuple(bodies), depth
+
+    def _run(
+        self, bodies: Sequence[BodyState], held: int | None, drives: Sequence[Drive] = ()
+    ) -> tuple[list[BodyState], float]:
+        """One control period, in the simulation that other worlds use in between.
+
+        Returns:
+            The free bodies afterwards, and how far any overlaps another, m.
+        """
+        simulation = self._simulation
+        with simulation.lock:
+            simulation.place_fixed(self._fixed_poses)
+            simulation.set_materials(self._materials)
+            return simulation.run(bodies, held, drives), simulation.deepest()
 
     def _frozen(self, now: Snapshot, end: Posture) -> tuple[BodyState, ...]:
         """The free bodies as they were, without velocity; the held one with the hand."""
@@ -278,7 +284,7 @@ class PandaWorld(SimulatedWorld[Scene]):
         key = (self._fixed_poses, self._materials, now.held, poses)
         stable = self._stability.get(key)
         if stable is None:
-            after = self._simulation.run(now.bodies, now.held)
+            after, _ = self._run(now.bodies, now.held)
             stable = all(_rests(now.bodies[i], after[i]) for i in loose)
             if len(self._stability) == CACHE_SIZE:
                 self._stability.clear()
