@@ -11,9 +11,9 @@ from time import time_ns
 
 from slap_ros.api.argument_kinds import checks_arguments
 from slap_ros.api.planning import planner_for
-from slap_ros.api.video import write_video
+from slap_ros.api.video import frame_size, write_video
 from slap_ros.bags.run_recording import record_run
-from slap_ros.core import Action, Domain, PictureSize, Task
+from slap_ros.core import Action, Domain, Task
 from slap_ros.core.notebook import ShownInNotebooks
 from slap_ros.planning.execution import MAX_REPLANS, EpisodeResult, ExecutedEdge, Executor
 from slap_ros.planning.plan import Plan, PlanningResult
@@ -111,10 +111,11 @@ class Run(ShownInNotebooks):
             The path.
 
         Raises:
-            InvalidParameterError: The domain displays no bodies, or the name has another ending.
+            InvalidParameterError: The domain displays no bodies, the name has another ending, or
+                the size cannot be.
             StorageFullError: It cannot be written.
         """
-        pixels = None if size is None else PictureSize(*size)
+        pixels = None if size is None else frame_size(size)
         write_video(self.domain, self.states, Path(path), pixels)
         return Path(path)
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import index
 from pathlib import Path
 
 from slap_ros.core import Animate, Domain, PictureSize
@@ -13,6 +14,30 @@ from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.files import require_writable
 from slap_ros.relational import State
 from slap_ros.worlds.animation import WRITERS
+
+LARGEST = PictureSize(3840, 2160)
+
+
+def frame_size(given: object) -> PictureSize:
+    """A size of frames that was given by width and height.
+
+    Args:
+        given: Width and height, pixels.
+
+    Raises:
+        InvalidParameterError: It is not two even numbers, or larger than ``LARGEST``.
+    """
+    try:
+        size = PictureSize(*map(index, given))  # type: ignore[call-overload]
+    except TypeError:
+        size = PictureSize(0, 0)
+    within = all(2 <= n <= most for n, most in zip(size, LARGEST, strict=True))
+    if not within or any(n % 2 for n in size):
+        raise InvalidParameterError(
+            f"size must be two even numbers of pixels up to {LARGEST.width} and {LARGEST.height}, "
+            f"such as (960, 720), not {given!r}"
+        )
+    return size
 
 
 def require_renderable(domain: Domain, state: State, path: Path) -> None:

@@ -11,14 +11,13 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.api.video import write_video
+from slap_ros.api.video import LARGEST, frame_size, write_video
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console
 from slap_ros.core import Domain, PictureSize
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import State
 
-LARGEST = PictureSize(3840, 2160)
 Size = Annotated[
     str | None,
     typer.Option(
@@ -36,15 +35,13 @@ def picture_size(text: str | None) -> PictureSize | None:
     if text is None:
         return None
     found = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", text, re.ASCII)
-    if found is not None:
-        size = PictureSize(int(found[1]), int(found[2]))
-        within = all(2 <= n <= most for n, most in zip(size, LARGEST, strict=True))
-        if within and not any(n % 2 for n in size):
-            return size
-    raise InvalidParameterError(
-        f"--size is two even numbers of pixels up to {LARGEST.width}x{LARGEST.height}, such as "
-        f"960x720, not {text!r}"
-    )
+    try:
+        return frame_size(found and map(int, found.groups()))
+    except InvalidParameterError as error:
+        raise InvalidParameterError(
+            f"--size is two even numbers of pixels up to {LARGEST.width}x{LARGEST.height}, such as "
+            f"960x720, not {text!r}"
+        ) from error
 
 
 def render(

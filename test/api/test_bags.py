@@ -156,6 +156,13 @@ def test_a_video_is_written(run, tmp_path):
         run.video(tmp_path / "run.txt")
 
 
+@pytest.mark.parametrize("size", [3, (160,), (161, 120), (160, 120.5), (0, 120), (9999, 120), "ab"])
+def test_a_video_of_a_size_that_cannot_be_is_refused(run, tmp_path, size):
+    with pytest.raises(InvalidParameterError, match="size must be two even numbers of pixels"):
+        run.video(tmp_path / "run.gif", size=size)
+    assert not list(tmp_path.iterdir())
+
+
 def test_rows_of_trials_are_a_table():
     domain = slap_ros.make("obstacle2d")
     rows = slap_ros.evaluate(domain, None, tasks=2, seeds=1)
