@@ -22,6 +22,7 @@ from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.policies.library_files import SHORTCUT, require_places
+from slap_ros.shortcuts.approaches import require_sides
 from slap_ros.shortcuts.candidate_groups import CandidateGroup
 from slap_ros.shortcuts.named_settings import training_settings
 from slap_ros.shortcuts.settings import TrainingSettings
@@ -143,7 +144,8 @@ def chosen_settings(
         steps: Environment steps per shortcut; None for those of the settings.
 
     Raises:
-        InvalidParameterError: There are none of that name, or they cannot be changed so.
+        InvalidParameterError: There are none of that name, they cannot be changed so, or they
+            explore approaches, of which the domain has none.
         InvalidDomainError: See :func:`~slap_ros.shortcuts.named_settings.training_settings`.
     """
     chosen = training_settings(name, domain)
@@ -153,6 +155,8 @@ def chosen_settings(
     if steps is not None and (both := [n for n in parsed if n.endswith("total_steps")]):
         raise InvalidParameterError(f"--steps and --set {both[0]} say the same: give one")
     chosen = changed(chosen, parsed)
+    if chosen.exploration.approaches:
+        require_sides(domain)
     return chosen if steps is None else chosen.with_total_steps(steps)
 
 

@@ -16,7 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from slap_ros.core import Domain, SideApproach, World
-from slap_ros.errors import InvalidStateError
+from slap_ros.core.acquisition import no_sides
+from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import Object, State
 from slap_ros.relational.state import Array
@@ -44,6 +45,19 @@ class Approached:
     commands: Array
     onwards: Array
     side: str
+
+
+def require_sides(domain: Domain) -> None:
+    """Refuse a domain without approaches, in which next to nothing would be explored.
+
+    Raises:
+        InvalidParameterError: It has none.
+    """
+    if domain.acquisition is None or domain.acquisition.sides is no_sides:
+        raise InvalidParameterError(
+            f"{domain.name} does not say from which sides an object can be approached "
+            "(Acquisition.sides), so there are no approaches to explore; train with other settings"
+        )
 
 
 def sides_of(domain: Domain, state: State, obj: Object) -> tuple[SideApproach, ...]:

@@ -153,6 +153,13 @@ def test_a_library_is_that_of_the_command(domain, tmp_path, monkeypatch):
     slap_ros.plan(domain, domain.task(seed=1), library)
 
 
+def test_approaches_are_refused_where_a_domain_has_none(domain, tmp_path):
+    for wanted in ({"settings": "ours_approaches"}, {"changes": {"exploration.approaches": 1}}):
+        with pytest.raises(InvalidParameterError, match="from which sides"):
+            slap_ros.train(domain, tmp_path / "library", **wanted)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_domain_without_skills_to_acquire_is_refused(domain, tmp_path):
     with pytest.raises(InvalidParameterError, match="what skills are acquired with"):
         slap_ros.acquire(domain, tmp_path / "skills")
