@@ -68,6 +68,15 @@ def test_later_goals_are_compared_with_the_first_and_forgetting_shows(tmp_path):
     assert "| from scratch | task2 | 1 | 900 | 1800 | 1.00 | 0.00 | 1.00 |" in page
 
 
+def test_where_there_is_no_other_those_that_ship_are_read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = study("--output", tmp_path / "out")
+    assert ran.exit_code == 0, ran.output
+    made = json.loads((tmp_path / "out" / "sequence_groceries.json").read_text())
+    assert made["command"] == "slap study sequence groceries"
+    assert [len(goals) for goals in made["found"]["sequences"]["carried on"]] == [10, 10]
+
+
 def test_a_sequence_that_has_not_come_to_its_end_counts_as_far_as_it_came(tmp_path):
     whole = sequence(tmp_path / "0", (1000, 200, 300), ((1.0,), (1.0, 1.0), (1.0, 1.0, 1.0)))
     begun = sequence(tmp_path / "s", (1000, 600), ((0.5,), (0.25, 0.5)), scratch=True)

@@ -353,8 +353,8 @@ class ProgressOptions:
         list[Path] | None,
         CommandOption(
             "Folder of a baseline with the reward `stages` that `slap baseline train` made. May be "
-            "repeated: trainings of the same method share a row. Default: all that ship, or else "
-            f"all of {BASELINES}/DOMAIN-*.",
+            "repeated: trainings of the same method share a row. Default: all of "
+            f"{BASELINES}/DOMAIN-*, or else those that ship.",
             metavar="FOLDER",
         ),
     ] = None
@@ -376,8 +376,8 @@ def prepare(options: ProgressOptions, tell: Tell) -> PreparedStudy:
     domain = get_domain(options.domain, options.preset)
     libraries = options.library or shipped_skills(options.domain)
     choices = [DomainChoice(domain.name, domain.preset, str(folder)) for folder in libraries]
-    shipped = shipped_baselines(domain.name)
-    folders = options.against or shipped or baselines_in_runs(domain.name)
+    named = options.against or baselines_in_runs(domain.name)
+    folders = named or shipped_baselines(domain.name)
     baselines = open_baselines(folders, domain, lambda one: _why_not(one, domain.preset), tell)
     if not baselines:
         raise InvalidParameterError(
@@ -396,7 +396,7 @@ def prepare(options: ProgressOptions, tell: Tell) -> PreparedStudy:
         lambda runner: study(domain, choices, baselines, goals, tasks, runner),
         {
             "library": options.library,
-            "against": options.against if shipped else folders,
+            "against": named or None,
             "goal": options.goal,
             "trainings": None,
         },

@@ -17,6 +17,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.summary import Spread, format_spread
 from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.policies.shipped_models import shipped_with_siblings
 from slap_ros.skills.skill_library import read_library_record
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.options import RESULTS, Output
@@ -220,7 +221,7 @@ class SequenceStudyOptions:
         list[Path] | None,
         CommandOption(
             "Folder that `slap acquire-sequence` made, one per seed, with --scratch or without. "
-            f"May be repeated. Default: all in {SEQUENCES}/DOMAIN*.",
+            f"May be repeated. Default: all in {SEQUENCES}/DOMAIN*, or else those that ship.",
             metavar="FOLDER",
         ),
     ] = None
@@ -235,7 +236,9 @@ def prepare(options: SequenceStudyOptions, tell: Tell) -> PreparedStudy:
         InvalidParameterError: None can be used, or they have other goals.
     """
     domain = get_domain(options.domain)
-    folders = options.library or _in_runs(domain.name)
+    folders = (
+        options.library or _in_runs(domain.name) or shipped_with_siblings("skills", domain.name)
+    )
     kinds: dict[str, list[tuple[SequenceStep, ...]]] = {CARRIED: [], RELEARNED: [], SCRATCH: []}
     for folder in folders:
         try:
