@@ -3,6 +3,7 @@
 """Learners of the whole task beside acquired skills: the rows are those of tasks and records."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -64,6 +65,19 @@ def test_who_holds_still_does_nothing_and_skills_do_all_stages(tmp_path, feature
     page = (tmp_path / "out" / "progress_stack_at_target.md").read_text()
     assert "| training | sac | 2 × 2 | 4000 ± 0 | 0.00 ± 0.00 | 0%" in page
     assert "| training | ours (manual, manual) | 1 × 2 | 18000 | " in page  # one has no spread
+
+
+def test_where_there_is_no_other_those_that_ship_are_compared(tmp_path, monkeypatch):
+    shipped = Path("models/skills/stow_hammer").resolve()
+    monkeypatch.chdir(tmp_path)
+    ran = slap(
+        "study", "progress", "stow_hammer", "--library", shipped, "--tasks", 1,
+        "--goal", "training", "--output", tmp_path,
+    )  # fmt: skip
+    assert ran.exit_code == 0, ran.output
+    made = json.loads((tmp_path / "progress_stow_hammer.json").read_text())
+    assert {"sac", "curriculum", "maple"} < {row["method"] for row in made["found"]["rows"]}
+    assert "--against" not in made["command"]
 
 
 def test_what_cannot_be_compared_is_left_out_with_a_reason(tmp_path, features):
